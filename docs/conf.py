@@ -51,7 +51,7 @@ def _inline(writer: Any, node: nodes.math) -> None:
 def _add_options(app: Any, docname: str, source: list[str]) -> None:
     """The page of all options ends with them, as the commands declare them."""
     if docname == "options":
-        from fogml.cli.options_page import options_page
+        from fogml.cli.docs_job import options_page
 
         source[0] += options_page()
 

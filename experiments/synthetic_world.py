@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from fogml.arrays import FloatArray
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

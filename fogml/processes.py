@@ -1,4 +1,4 @@
-"""Processes that fogml starts: they end with the one that started them, and print no warnings."""
+"""Processes that fogml starts, which end with the one that started them and print no warnings; threads."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from types import FrameType
-from typing import Any, NoReturn, TypeVar
+from typing import Any, Literal, NoReturn, TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -155,3 +156,24 @@ def process_start(pid: int) -> str:
     state, *rest = fields.split()
     # A process that has ended but was not waited for runs no trial.
     return "ended" if state == "Z" else rest[18]
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def one_thread(api: Literal["blas", "openmp"]) -> Any:
+    """A context in which calls of BLAS, or OpenMP, use one thread each.
+
+    It knows the libraries that were loaded when it was first asked for.
+    """
+    return _controller(api).limit(limits=1, user_api=api)
+
+
+@cache
+def _controller(api: str) -> Any:
+    # Looking the libraries up takes milliseconds; they stay where they are.
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.escaping import markup
 
-FloatArray = NDArray[np.float64]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 8.0, 8.0, 34.0
 _TITLE = 25.0
 """Width of the title of the upright axis with what is free about it."""

@@ -21,11 +21,10 @@ from experiments.benchmarks.peer_model import Budget, PeerModel
 from experiments.benchmarks.peers import PEERS
 from experiments.benchmarks.reasons import winners
 from experiments.benchmarks.study import Study
+from fogml.arrays import FloatArray
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
-from fogml.models.threads import available_cores
-from fogml.processes import in_processes
-from fogml.runs.run import FloatArray
+from fogml.processes import available_cores, in_processes
 from fogml.signals.averages import block_averages
 from fogml.validation.floors import floor_of_run
 from fogml.validation.run_errors import run_errors, training_means

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 from fogml.twin.twin import Twin
 
-FloatArray = NDArray[np.float64]
 PROGRAMMES = (
     "multi-point-cycle",
     "joint-staircase",

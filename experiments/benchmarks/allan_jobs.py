@@ -9,12 +9,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.harness import Job, Work
 from experiments.benchmarks.needs import needs
+from fogml.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 Deviations = tuple[FloatArray, FloatArray]
 _QUICK = 50_000
 LEAST_RATIO = 10.0

@@ -7,10 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.models.table import TrainingTable
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 _DEGREE = 3
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.synthetic_world import World, lag
+from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 _CYCLE_S = 36_000.0
 
 

@@ -10,12 +10,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.chamber import chamber_run
 from experiments.benchmarks.harness import Job, Timed, Work, run_python
+from fogml.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 _ROWS = 100_000_000
 _QUICK_ROWS = 200_000
 _GROUP = 1_000_000

@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.needs import needs
 from experiments.benchmarks.peer_model import Budget, PeerModel
 from experiments.benchmarks.peers import PEERS, Learner
 from experiments.benchmarks.study import Study
 from experiments.benchmarks.training import OURS, QUICK_MODELS, training_run
+from fogml.arrays import FloatArray
 from fogml.features.parse import parse_features
 
-FloatArray = NDArray[np.float64]
 Side = Callable[[FloatArray], FloatArray]
 FULL = Budget(settings=4, folds=3)
 QUICK = Budget(settings=1, folds=2, most_rows=100)

@@ -13,16 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.blind.baselines.answer import Finding, Prediction, write_answer
 from fogml.blind.baselines.regression import Regression
 from fogml.blind.folders import CaseFiles
 from fogml.blind.signatures import Stack, smooth_curves
 from fogml.json_files import write_json
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 THRESHOLD = 0.1
 """Terms under this share of the gap's rms are dropped."""
 FITS = 20

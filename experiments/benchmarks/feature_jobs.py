@@ -7,12 +7,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.chamber import chamber_run
 from experiments.benchmarks.harness import Job, Work
+from fogml.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 TEXT = "T, dT, T*dT, T_in-T_out, d(T_in-T_out)"
 _WINDOW = 64
 

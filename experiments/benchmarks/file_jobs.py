@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.chamber import chamber_run
 from experiments.benchmarks.harness import Job, Work
 from experiments.benchmarks.needs import needs
+from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 Columns = Mapping[str, FloatArray]
 _QUICK_ROWS = 20_000
 WITHIN = 1.0 / 1.3

@@ -33,8 +33,8 @@ from experiments.benchmarks.firmware_peers import (
 )
 from experiments.benchmarks.machine import describe_machine
 from experiments.synthetic_world import World, cycle
+from fogml.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 HERE = Path(__file__).parent
 FEATURES = "T, dT, T*dT"
 _ROWS = 200

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.benchmarks.firmware_cost import cortex_bytes, instructions
+from fogml.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 NEAR = 1.01
 """Ratio of judged errors within which the smaller model is taken."""
 _JUDGED_S = 120

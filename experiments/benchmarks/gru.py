@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.models.table import TrainingTable
 from fogml.signals.averages import block_averages
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 _WARM_UP = 32
 """Steps before each piece whose outputs do not count: the state settles on them."""
 _PIECES = 8

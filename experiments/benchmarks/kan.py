@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.models.table import TrainingTable
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 INTERVALS, DEGREE = 5, 3
 """Of each edge's spline: pykan's defaults."""
 _NOISE = 0.3

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.chamber import chamber_run, four_sensor_run
 from experiments.benchmarks.harness import Job, Work
-
-FloatArray = NDArray[np.float64]
+from fogml.arrays import FloatArray
 
 
 def _multipoint_columns(sensors: list[FloatArray]) -> FloatArray:

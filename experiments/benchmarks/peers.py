@@ -14,13 +14,11 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.gru import GRULearner
+from fogml.arrays import FloatArray, IndexArray
 from fogml.models.table import TrainingTable
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 Setting = Mapping[str, Any]
 INPUTS = "T, dT, T*dT"
 """The features that every peer but the cubic gets, and fogml's network by default."""

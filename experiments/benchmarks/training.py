@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.harness import high_water_mb, run_python
 from experiments.benchmarks.peer_model import Budget, PeerModel
@@ -26,9 +25,9 @@ from experiments.benchmarks.peers import PEERS, peer_of
 from experiments.benchmarks.study import Study
 from experiments.rbf_rates.__main__ import rms_error, world
 from experiments.synthetic_world import programme
+from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 SIZES = {"1e4": 10_000, "1e5": 100_000, "1e6": 1_000_000}
 RATES = {"one": (1.0,), "three": (0.5, 1.0, 2.0)}
 TESTS = {"slower": 0.7, "faster": 1.5}

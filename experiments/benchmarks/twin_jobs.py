@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.harness import Job, Timed, Work
+from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 IMU_SIMULATOR = "GNSS_INS_SIM"
 """Environment variable with the folder of a checkout of gnss-ins-sim."""
 _LOOPED = 100_000

@@ -18,7 +18,7 @@ import numpy as np
 
 from experiments.results import write_results
 from fogml import __version__
-from fogml.blind.case import draw_case, recorded_run
+from fogml.blind.make import draw_case, recorded_run
 from fogml.blind.plan import REALITIES, Plan
 from fogml.blind.scoring.statistics import wilson
 from fogml.cli.from_diagnosis import cause_model

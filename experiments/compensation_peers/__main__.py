@@ -32,8 +32,8 @@ from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.terms import composition_plan
 from fogml.models.base import DriftModel
+from fogml.models.compact import operations_of_compact, operations_of_features
 from fogml.models.names import make_model
-from fogml.models.operations import operations_of_compact, operations_of_features
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 from fogml.validation.compare import compare

@@ -15,8 +15,8 @@ from experiments.synthetic_world import World, cycle
 from fogml import __version__
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
+from fogml.models.candidates import MATERIAL
 from fogml.models.names import make_model
-from fogml.models.score import MATERIAL
 from fogml.models.table import training_table
 from fogml.runs.run import Run
 

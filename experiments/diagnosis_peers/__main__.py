@@ -22,7 +22,7 @@ from experiments.benchmarks.diagnosis import answered
 from experiments.benchmarks.diagnosis_peers import BOUNDS
 from experiments.results import write_results
 from fogml import __version__
-from fogml.benchmark.diagnosis_score import ALL, FIGURES, diagnosis_figures
+from fogml.benchmark.score import ALL, FIGURES, diagnosis_figures
 from fogml.blind.folders import OUTCOME, BlindFolder, case_files, read_json
 from fogml.blind.methods import load_method
 from fogml.blind.score import marks_of

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from experiments.firmware.units import (
@@ -28,17 +27,15 @@ from experiments.firmware.units import (
 )
 from experiments.results import write_results
 from fogml import __version__
-from fogml.export.c_program import cortex_m4_size
+from fogml.export.c_program import cortex_m4_size, instructions_per_sample
 from fogml.export.c_source import C_DTYPES, CSource, c_source
 from fogml.export.false_readings import false_readings
-from fogml.export.instructions import instructions_per_sample
 from fogml.export.plan import Plan
 from fogml.models.base import DriftModel
 from fogml.models.compensation import compensate_blocks
 from fogml.runs.run import Run
 
 HERE = Path(__file__).parent
-FloatArray = NDArray[np.float64]
 _SIZES = ("ram_bytes", "flash_bytes", "instructions_per_sample")
 WITHIN = 129
 """Samples that the windows hold, and the one that is told."""

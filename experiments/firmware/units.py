@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.synthetic_world import World, cycle
+from fogml.arrays import FloatArray
 from fogml.export.c_program import FLAGS, host_compiler
 from fogml.export.c_source import SOURCE, CSource
 from fogml.export.check import expected_outputs
@@ -22,7 +22,6 @@ from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 FEATURES = "T^1..3, dT, T*dT"
 NOISE_DEGC = 0.005
 _BLOCK = 1 << 19

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 import fogml
+from fogml.arrays import FloatArray
 from fogml.outputs import whole_file
 from fogml.report import style
-from fogml.runs.run import FloatArray
 from fogml.static_svg import Curve, line_figure
 
 PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "first-model.svg"

@@ -18,13 +18,12 @@ from typing import Any
 
 from fogml.blind.folders import DIAGNOSIS, OUTCOME, BlindFolder
 from fogml.blind.methods import BASELINES
-from fogml.blind.plan import SAME_TWIN
+from fogml.blind.plan import SAME_TWIN, record_use, uses
 from fogml.blind.score import gather, marks_of
 from fogml.blind.scoring.by_reality import ALL, by_form, by_reality
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.scoring.marks_file import MARKS, Marks, read_marks, write_marks
 from fogml.blind.scoring.statistics import proportion
-from fogml.blind.seeds import record_use, uses
 from fogml.blind.truth import read_truth
 from fogml.cli.blind import MakeSettings, RunSettings
 from fogml.cli.blind_job import make_and_tell, run_and_tell

@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.gap.model import Constant, EffectValue, NoisePrior
 from fogml.outputs import whole_file
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.effect import Effect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity

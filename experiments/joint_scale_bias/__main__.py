@@ -30,10 +30,11 @@ from experiments.joint_scale_bias.world import (
 )
 from experiments.results import write_results
 from fogml import __version__
+from fogml.arrays import BoolArray, FloatArray
 from fogml.features.parse import parse_features
 from fogml.lab.joint import run_figures, two_step
 from fogml.models.joint import JointModel
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from experiments.synthetic_world import programme
+from fogml.arrays import FloatArray
 from fogml.models.table import usable_rows
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.simulate import simulate

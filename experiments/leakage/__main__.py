@@ -15,9 +15,9 @@ from sklearn.preprocessing import StandardScaler
 
 from experiments.results import write_results
 from fogml import __version__
+from fogml.arrays import FloatArray
 from fogml.features.parse import parse_features
 from fogml.models.table import averaged_table, run_rows
-from fogml.runs.run import FloatArray
 from fogml.runs.shipped import shipped_run
 
 HERE = Path(__file__).parent

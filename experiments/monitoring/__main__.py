@@ -21,13 +21,14 @@ import numpy as np
 
 from experiments.results import write_results
 from fogml import __version__
+from fogml.arrays import FloatArray
 from fogml.blind.scoring.statistics import wilson
 from fogml.models.names import make_model
 from fogml.monitor.evidence import ChangePrior
 from fogml.monitor.record import RunRecord, record_run
 from fogml.monitor.watch import watch
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 from fogml.signals.random_noise import flicker_noise, white_noise
 

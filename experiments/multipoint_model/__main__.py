@@ -19,10 +19,11 @@ from experiments.multipoint_model.start_up import AVERAGING_S, curve, start_up
 from experiments.multipoint_table.__main__ import RUNS, SAMPLE_S, SENSORS, programme, unit
 from experiments.results import write_results
 from fogml import __version__
+from fogml.arrays import FloatArray
 from fogml.features.parse import parse_features
 from fogml.lab.forms import multipoint_form, rank_forms, sensor_sets, smallest_within
 from fogml.models.names import make_model
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin

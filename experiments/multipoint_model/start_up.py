@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from experiments.multipoint_table.__main__ import SAMPLE_S, SENSORS, programme, unit
+from fogml.arrays import FloatArray
 from fogml.lab.forms import multipoint_form
 from fogml.models.names import make_model
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.simulate import simulate

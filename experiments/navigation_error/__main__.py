@@ -18,11 +18,12 @@ from fogml.lab.navigation import (
     AXES,
     EARTH_RADIUS_M,
     GRAVITY_M_S2,
+    HOURS,
     constant_drift,
     error_matrices,
     gyrocompass_error_deg,
+    navigation_costs,
 )
-from fogml.lab.navigation_cost import HOURS, navigation_costs
 from fogml.models.names import make_model
 from fogml.outputs import whole_file
 from fogml.report import style

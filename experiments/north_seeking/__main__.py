@@ -15,11 +15,11 @@ import numpy as np
 from experiments.north_seeking.power_ons import cumulated, power_on, span_means, trained, unit
 from experiments.results import write_results
 from fogml import __version__
+from fogml.arrays import FloatArray
 from fogml.lab.north import Drift, Scheme, drift_error, horizontal_rate
 from fogml.lab.north_schemes import CoarseFine, Way, quiet_azimuths, seek, ways_of_equal_time, wrapped
 from fogml.outputs import whole_file
 from fogml.report import style
-from fogml.runs.run import FloatArray
 from fogml.static_svg import Curve, line_figure
 from fogml.yaml_text import read_yaml
 

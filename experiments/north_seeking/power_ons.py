@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin

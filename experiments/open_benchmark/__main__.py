@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.results import write_results
-from fogml.benchmark.entries import entry_plan
+from fogml.benchmark.answers import entry_plan
 from fogml.benchmark.make import make_round
 from fogml.benchmark.rounds import TRACKS, TrackFolder
 from fogml.benchmark.score import score_round

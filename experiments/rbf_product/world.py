@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.models.base import DriftModel
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.simulate import simulate

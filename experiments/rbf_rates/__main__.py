@@ -15,9 +15,10 @@ import numpy as np
 from experiments.results import write_results
 from experiments.synthetic_world import World, programme
 from fogml import __version__
+from fogml.arrays import FloatArray
 from fogml.features.parse import parse_features
 from fogml.models.names import make_model
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 
 HERE = Path(__file__).parent

@@ -13,15 +13,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from experiments.real_files.section import Section, table
+from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 from fogml.runs.writing import write_run
-
-FloatArray = NDArray[np.float64]
 
 RUNS = ("thermal-cycle-2-x", "thermal-cycle-3-x")
 BEGIN = datetime(2026, 3, 2, 23, 59, 30)

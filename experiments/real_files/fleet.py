@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import t
 
 from experiments.real_files.section import Section
+from fogml.arrays import FloatArray
 from fogml.features.parse import parse_features
 from fogml.fleet.constants import FORM, FleetConstants, UnitConstants, fleet_constants
 from fogml.fleet.shared import ODD, DrawnMember, size_priors
@@ -16,7 +17,7 @@ from fogml.models.mixed_effects_model import averages_of, composed
 from fogml.models.prior import agreement
 from fogml.models.table import run_rows, training_table
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 MEAN = np.array([0.2, 4e-3, -3e-5, 4e-7, 0.12, 1.5e-3])
 SPREAD = np.array([0.1, 1e-3, 1e-5, 1e-7, 0.03, 4e-4])

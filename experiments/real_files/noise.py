@@ -6,14 +6,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
 from experiments.real_files.section import Section, table
+from fogml.arrays import FloatArray
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 N_TRUE = 0.01
 """Angle random walk of every log [deg/sqrt(h)]."""
 LOGS, QUICK_LOGS = 200, 3

@@ -10,9 +10,10 @@ import numpy as np
 
 from experiments.real_files.fleet import MEAN, SAMPLE_S, SPREAD, WHITE, flicker, temperatures
 from experiments.real_files.section import Section, table
+from fogml.arrays import FloatArray
 from fogml.models.names import make_model
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.tuning.plan import Plan
 from fogml.tuning.references import AUTO, DEFAULT, reference_choices
 from fogml.tuning.space import Choice, Space

@@ -15,11 +15,11 @@ from experiments.results import write_results
 from experiments.shared_knowledge.ideal import nats_for_odd
 from experiments.shared_knowledge.page import page
 from experiments.shared_knowledge.units import SAMPLE_S, TEST_RATE, TRAIN_RATE, run, unit
+from fogml.arrays import BoolArray, FloatArray
 from fogml.fleet.constants import FORM, FleetConstants, UnitConstants, fleet_constants
 from fogml.fleet.shared import SharedModel, shared_model
 from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.names import make_model
-from fogml.runs.run import BoolArray, FloatArray
 from fogml.validation.judge import judge
 
 HERE = Path(__file__).parent

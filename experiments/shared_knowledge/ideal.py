@@ -11,13 +11,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.shared_knowledge.units import MEAN, NOISE, SAMPLE_S, SPREAD, TRAIN_RATE
 from experiments.synthetic_world import World, block_rate, cycle
+from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 _CENTRE = np.array([*MEAN["polynomial"], MEAN["rate"], MEAN["product"]])
 _WIDTH = np.array([*SPREAD["polynomial"], SPREAD["rate"], SPREAD["product"]])
 

@@ -13,9 +13,8 @@ import numpy as np
 
 from experiments.synthetic_world import World, cycle
 from experiments.watch.counting import calls, modules_loaded, peak_bytes
-from fogml.export.c_program import cortex_m4_size
+from fogml.export.c_program import cortex_m4_size, instructions_per_sample
 from fogml.export.c_source import c_source
-from fogml.export.instructions import instructions_per_sample
 from fogml.export.plan import Plan
 from fogml.features.features import Features
 from fogml.models.compensation import compensate_blocks

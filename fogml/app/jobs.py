@@ -130,7 +130,7 @@ class Jobs:
         return [str(path.relative_to(self.home)) for home in homes for path in sorted(home.glob(pattern))]
 
     def runs(self) -> list[dict[str, Any]]:
-        """Runs that were imported, as `fogml.app.files.Files.told` tells of files."""
+        """Runs that were imported, as `fogml.app.state.Files.told` tells of files."""
         jobs = [(self.folder / name, _read(self.folder / name / "job.json") or {}) for name in self.names()]
         found = [
             place

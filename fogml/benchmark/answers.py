@@ -1,4 +1,4 @@
-"""What an entry answers to a drift case: written by a method, or by hand, and read with every fault told."""
+"""Entries, and what one answers to a drift case: by a method or by hand, read with every fault told."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from fogml.benchmark.rounds import ANSWER
+from fogml.arrays import FloatArray
+from fogml.benchmark.rounds import ANSWER, Track, TrackFolder, read_round
 from fogml.blind.folders import OUTCOME, CaseFiles, read_json
+from fogml.blind.run import RunPlan
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.runs.reading import read_run
-from fogml.runs.run import FloatArray
 from fogml.validation.run_errors import run_errors
 
 HEADER = ("drift [deg/h]", "half_width [deg/h]")
@@ -139,3 +140,67 @@ def _check_row(line: str, cells: tuple[str, ...], path: Path, row: int) -> None:
             raise InputError(
                 f"{path}, column '{cell}', row {row}: '{text.strip()[:40]}', expected a finite number{least}"
             )
+
+
+_DRIFT_MODEL = "fogml.benchmark.answers:drift_model"
+
+
+def entry_name(method: str, name: str | None = None) -> str:
+    """What the answers of a method are called: its name, without the module of a function or regressor."""
+    return name or method.rpartition(":")[2].rpartition(".")[2]
+
+
+def entry_plan(
+    directory: str | Path,
+    track: Track,
+    method: str,
+    *,
+    name: str | None = None,
+    features: str | None = None,
+    code: Path | None = None,
+    workers: int = 1,
+    limit_s: float = 600.0,
+    retry: bool = False,
+    seed: int = 0,
+) -> RunPlan:
+    """How a method answers a track.
+
+    Parameters
+    ----------
+    directory
+        The round, or what was handed out of it as ``handout`` in a folder.
+    track
+        ``drift`` or ``diagnosis``.
+    method
+        Of the drift track a model's name, of the diagnosis track that of a method of ``fogml blind run``; of
+        both ``module:function``, called with the case's files and the folder for its answer.
+    name
+        What its answers are called.
+    features
+        Of a drift model by its name.
+    code
+        Folder of the method's own code, where that is not installed.
+    workers, limit_s, retry, seed
+        As of `fogml.blind.run.RunPlan`.
+    """
+    read_round(directory)
+    by_name = track == "drift" and ":" not in method
+    if by_name:
+        from fogml.models.names import make_model
+
+        make_model(method, features)  # a name that is not known is told before any process begins
+    folder = TrackFolder(Path(directory), track)
+    called = entry_name(method, name)
+    return RunPlan(
+        folder=folder,
+        method=_DRIFT_MODEL if by_name else method,
+        name=called,
+        code=code,
+        workers=workers,
+        limit_s=limit_s,
+        retry=retry,
+        into=folder.answers(called),
+        seed=seed,
+        options={"model": method, "features": features} if by_name else {},
+        answer=ANSWER[track],
+    )

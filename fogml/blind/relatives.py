@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
+from fogml.arrays import FloatArray
 from fogml.blind.folders import BlindFolder, case_files, read_json, write_sums
 from fogml.blind.signatures import Atom, Stack, atoms, free_shape
 from fogml.blind.truth import Truth, read_contributions, read_truth, write_truth
 from fogml.outputs import whole_file
 from fogml.processes import in_processes
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 
 ALIKE = 0.95

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.blind.folders import SUMS, BlindFolder, check_sums
+from fogml.blind.plan import check_use
 from fogml.blind.relatives import relatives_of
 from fogml.blind.run import Progress
 from fogml.blind.scoring.answers import read_answer
@@ -16,7 +17,6 @@ from fogml.blind.scoring.marks import Mark, mark
 from fogml.blind.scoring.marks_file import Marks, part_of
 from fogml.blind.scoring.table import BY_KEY
 from fogml.blind.scoring.values import score_values
-from fogml.blind.seeds import check_use
 from fogml.blind.truth import Truth, read_truth
 from fogml.errors import InputError, known_are
 from fogml.processes import in_processes

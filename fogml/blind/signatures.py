@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.model import Candidate, TwinModel
 from fogml.gap.reading import rows_of
 from fogml.gap.rows import Rows
 from fogml.gap.settings import STANDARD
 from fogml.runs.reading import read_run
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_fit import fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener

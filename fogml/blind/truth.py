@@ -14,16 +14,14 @@ from typing import Any, Literal, get_args
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, printable
 from fogml.json_files import write_json
 from fogml.outputs import whole_file
 from fogml.signals.noise_model import NoiseModel
 from fogml.strict_json import read_bytes
-
-FloatArray = NDArray[np.float64]
 
 SCHEMA = "fogml.blind_truth/1"
 Kind = Literal[

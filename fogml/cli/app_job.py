@@ -1,14 +1,184 @@
-"""The job of ``fogml app``."""
+"""The job of ``fogml app``: forms made of the commands' settings, and the command line of a filled form."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal, get_args
 
-from fogml.cli.app import AppSettings
-from fogml.cli.app_forms import forms, words_of
+from fogml.cli.given import Given, load
+from fogml.cli.main import COMMANDS
+from fogml.cli.run_commands import AppSettings
+from fogml.cli.settings import SHIPPED, Settings, given_settings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.outputs import sole_writer
+
+INPUTS: Mapping[str, Mapping[str, str]] = {
+    "import": {"file": "run", "profile": "profile"},
+    "inspect": {"runs": "run"},
+    "noise": {"run": "run"},
+    "train": {"runs": "run", "test": "run", "noise": "run"},
+    "compare": {"runs": "run", "test": "run", "noise": "run"},
+    "diagnose": {"runs": "run", "held_out": "run", "noise": "run", "twin": "twin"},
+    "export": {"model": "model", "train": "run", "matrix": "file"},
+    "monitor": {"model": "models", "runs": "run"},
+    "fleet": {"manifest": "manifest", "prior": "fleet", "twin": "twin", "acceptance_limits": "file"},
+}
+"""Commands of the app in the order of work, and what each of their settings that name files takes."""
+LABELS = {
+    ("train", "runs"): "train",
+    ("compare", "runs"): "train",
+    ("import", "file"): "read",
+    ("diagnose", "runs"): "fit",
+    ("monitor", "runs"): "new",
+    ("train", "test"): "judge",
+    ("compare", "test"): "judge",
+    ("diagnose", "held_out"): "held out",
+}
+FIXED = {"monitor": ["--store", "store"]}
+"""What the app adds: units in service share one store in the app's folder."""
+LEFT_OUT = frozenset({"out", "store", "cluster", "track"})
+"""Settings that the app makes itself, or that ask another machine."""
+NAMED = frozenset({"twin", "profile"})
+"""What an input takes that a name may stand for: what ships is listed beside the folder's."""
+
+
+def forms() -> list[dict[str, Any]]:
+    """The commands with their inputs and settings, JSON-ready."""
+    return [_form(command, settings_of(command)) for command in INPUTS]
+
+
+def settings_of(command: str) -> type[Settings]:
+    """The settings of a command of the app."""
+    found: type[Settings] = load(COMMANDS[command][0].replace(".", "fogml.cli.", 1))
+    return found
+
+
+def _form(command: str, settings: type[Settings]) -> dict[str, Any]:
+    given = given_settings(settings)
+    inputs = [
+        {
+            "key": key,
+            "takes": takes,
+            "label": LABELS.get((command, key), key.replace("_", " ")),
+            "help": given[key].help,
+            "several": "list" in str(settings.model_fields[key].annotation),
+            "known": list(given[key].known_names()) if takes in NAMED else [],
+        }
+        for key, takes in INPUTS[command].items()
+    ]
+    own = [
+        _field(settings, key, one)
+        for key, one in given.items()
+        if key not in INPUTS[command] and key not in LEFT_OUT and not (one.reads or one.writes)
+    ]
+    return {"command": command, "help": COMMANDS[command][1], "inputs": inputs, "settings": own}
+
+
+def _field(settings: type[Settings], key: str, given: Given) -> dict[str, Any]:
+    field = settings.model_fields[key]
+    annotation = str(field.annotation)
+    choices = [str(choice) for choice in get_args(field.annotation)] if _is_literal(field.annotation) else []
+    kind = "choice" if choices else "switch" if "bool" in annotation else "text"
+    if kind == "text" and not given.as_text and ("dict[" in annotation or "list[" in annotation):
+        kind = "lines"
+    default = field.get_default(call_default_factory=True)
+    shown = default if isinstance(default, (bool, int, float, str)) else ""
+    return {
+        "key": key,
+        "kind": kind,
+        "help": given.help,
+        "metavar": given.metavar or "",
+        "default": shown,
+        "choices": choices,
+        "known": [str(name) for name in given.known_names()] if kind == "text" else [],
+    }
+
+
+def _is_literal(annotation: Any) -> bool:
+    return getattr(annotation, "__origin__", None) is Literal
+
+
+def words_of(
+    command: str, values: Mapping[str, Any], known: Callable[[str], Sequence[str]], results: str
+) -> list[str]:
+    """The words of a command line of a form.
+
+    Parameters
+    ----------
+    command
+        Of the app.
+    values
+        What was filled in, by setting; empty text is not filled in.
+    known
+        Paths that may be named, by what an input takes.
+    results
+        Folder that the command writes.
+
+    Raises
+    ------
+    InputError
+        If the command or a setting is none of the app's, or a path is none that the app offers.
+    """
+    if command not in INPUTS:
+        raise InputError(f"the app has no command {quoted(command)}")
+    settings = settings_of(command)
+    given = given_settings(settings)
+    places: list[str] = []
+    named: list[str] = []
+    form = {field["key"]: field for field in _form(command, settings)["settings"]}
+    for key in values:
+        if key not in INPUTS[command] and key not in form:
+            raise InputError(f"{command}: the app has no setting {quoted(key)}")
+    for key, takes in INPUTS[command].items():
+        paths = [_checked(path, takes, known, given[key]) for path in _texts(key, values.get(key))]
+        if given[key].argument:
+            places += paths
+        elif paths:
+            name = _option(key, given[key])
+            named += [name, *paths] if given[key].spread else [w for path in paths for w in (name, path)]
+    for key, field in form.items():
+        named += _setting(key, given[key], field, values.get(key))
+    # Of a draft --out names the file itself.
+    out = f"{results}/profile.yaml" if command == "import" and values.get("draft") else results
+    return [command, *places, *named, *FIXED.get(command, []), "--out", out]
+
+
+def _checked(path: str, takes: str, known: Callable[[str], Sequence[str]], given: Given) -> str:
+    """A path that the app offers, or a name that ships."""
+    ships = given.known_names() if path.startswith(SHIPPED) or takes in NAMED else ()
+    if path not in ships and path not in known(takes):
+        raise InputError(f"{quoted(path)} is no {takes} of the app's folder; choose one that is listed")
+    return str(PurePosixPath(path)) if path not in ships else path
+
+
+def _texts(key: str, value: Any) -> list[str]:
+    texts = [value] if isinstance(value, str) else value or []
+    if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
+        raise InputError(f"'{key}': names were expected, found {quoted(value)}")
+    return [text for text in texts if text]
+
+
+def _option(key: str, given: Given) -> str:
+    return given.names[0] if given.names else "--" + key.replace("_", "-")
+
+
+def _setting(key: str, given: Given, field: Mapping[str, Any], value: Any) -> list[str]:
+    """Words of a setting; none where it is not filled in, or as it is without."""
+    name = _option(key, given)
+    if field["kind"] == "switch":
+        if value is None or bool(value) == bool(field["default"]):
+            return []
+        return [name.split("/")[0 if value else 1]]
+    if field["kind"] == "lines":
+        return [
+            f"{name}={line.strip()}" for line in "\n".join(_texts(key, value)).splitlines() if line.strip()
+        ]
+    text = str(value).strip() if isinstance(value, (str, int, float)) else ""
+    if not text or text == str(field["default"]):
+        return []
+    return [f"{name}={text}"]
 
 
 def serve(settings: AppSettings, terminal: Terminal) -> None:

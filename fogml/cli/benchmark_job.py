@@ -42,7 +42,7 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
 
 def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     """Answer a track by each method, and say how many cases failed."""
-    from fogml.benchmark.entries import entry_plan
+    from fogml.benchmark.answers import entry_plan
     from fogml.blind.run import run_cases
 
     if not settings.methods:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from fogml.cli.compare import CompareSettings
+from fogml.cli.model_commands import CompareSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.train_job import check_settings, floor_words, noise_run
@@ -13,8 +13,8 @@ from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.validation.compare import Comparison, compare
+from fogml.validation.limits import hold_strict
 from fogml.validation.report_json import comparison_json
-from fogml.validation.strict import hold_strict
 
 _OWN_CHOICE = ("auto", "polynomial", "rbf")
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.cli.compensate import CompensateSettings
+from fogml.arrays import IntArray
+from fogml.cli.model_commands import CompensateSettings
 from fogml.cli.runs import open_blocks
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
@@ -53,9 +53,7 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     _print(settings, model.kind, memories, counts, terminal)
 
 
-def _compensate(
-    model: DriftModel, blocks: Iterable[Run], out: Path, any_unit: bool, work: Work
-) -> NDArray[np.int64]:
+def _compensate(model: DriftModel, blocks: Iterable[Run], out: Path, any_unit: bool, work: Work) -> IntArray:
     """Write the compensated run; how many samples got each flag, shape (3,)."""
     from fogml.models.compensation import compensate_blocks
     from fogml.runs.writing import BlockWriter, carried_cells, header_cells
@@ -86,7 +84,7 @@ def _print(
     settings: CompensateSettings,
     kind: str,
     memories: list[str],
-    counts: NDArray[np.int64],
+    counts: IntArray,
     terminal: Terminal,
 ) -> None:
     assert settings.run and settings.out

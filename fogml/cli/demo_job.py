@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fogml.cli.demo import DemoSettings
+from fogml.cli.run_commands import DemoSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import SHIPPED
 from fogml.cli.terminal import Terminal, number

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fogml.cli.effects import EffectsSettings
 from fogml.cli.terminal import Terminal, number
+from fogml.cli.twin_commands import EffectsSettings
 from fogml.outputs import whole_folder
 from fogml.twin.effect import Effect
 from fogml.twin.registry import effect, effects
@@ -28,8 +28,7 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
     found = effects()
     if out is not None:
         from fogml.report.effect_card import catalogue_page
-        from fogml.twin.card import card_values
-        from fogml.twin.pictures import allan_curve, pictures, rate_curves
+        from fogml.twin.pictures import allan_curve, card_values, pictures, rate_curves
 
         cards = []
         with whole_folder(out, shared=True) as folder:
@@ -66,8 +65,7 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
 
 
 def _card(id: str, out: str | None, terminal: Terminal) -> None:
-    from fogml.twin.card import card_values
-    from fogml.twin.pictures import STANDARD_PROGRAMMES, allan_curve, pictures, rate_curves
+    from fogml.twin.pictures import STANDARD_PROGRAMMES, allan_curve, card_values, pictures, rate_curves
 
     declared = effect(id)
     values = card_values(declared)

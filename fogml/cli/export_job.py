@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fogml.cli.each_axis import axis_folders
-from fogml.cli.export import ExportJobSettings
+from fogml.cli.model_commands import ExportJobSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError

@@ -1,15 +1,14 @@
-"""The job of ``fogml fleet``."""
+"""The job of ``fogml fleet``, and the batch of its acceptance reports."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fogml.cli.fleet import FleetSettings
-from fogml.cli.fleet_batch import batch_of, write_batch
 from fogml.cli.fleet_unit import UnitWork
 from fogml.cli.terminal import Terminal, Work, number
+from fogml.cli.unit_commands import FleetSettings
 from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
@@ -21,6 +20,38 @@ from fogml.outputs import sole_writer, whole_folder
 from fogml.runs.sources import sources_stamp
 from fogml.strict_json import read_json
 from fogml.tracking import Tracker
+
+
+def batch_of(units: Sequence[Mapping[str, Any]], home: Path) -> dict[str, Any] | None:
+    """The batch of the units whose acceptance report is there, schema ``fogml.batch/1``; None without one.
+
+    Parameters
+    ----------
+    units
+        Of a ``fleet.json``.
+    home
+        The fleet's folder.
+
+    Raises
+    ------
+    InputError
+        If a unit's report was taken away or changed by hand.
+    """
+    from fogml.lab.batch import batch_json, read_reports
+
+    done = [unit for unit in units if unit["job"] == "acceptance" and unit["status"] == DONE]
+    return batch_json(read_reports([home / unit["folder"] for unit in done]), home) if done else None
+
+
+def write_batch(batch: Mapping[str, Any], folder: Path, name: str) -> None:
+    """Write batch.json, batch.html and batch.xlsx into a folder."""
+    from fogml.report.acceptance_page import batch_page
+    from fogml.report.spreadsheets import batch_spreadsheet
+
+    write_json(folder / "batch.json", batch)
+    (folder / "batch.html").write_text(batch_page(batch, name), encoding="utf-8")
+    batch_spreadsheet(batch, folder / "batch.xlsx")
+
 
 _SHOWN = 40
 
@@ -82,7 +113,7 @@ def _check(settings: FleetSettings) -> None:
 
     parse_features(settings.form)
     if settings.acceptance_limits is not None:
-        from fogml.lab.acceptance_limits import read_limits
+        from fogml.lab.acceptance_rows import read_limits
 
         read_limits(settings.acceptance_limits)
     if settings.device is not None:
@@ -126,7 +157,7 @@ def _run(
             terminal.note(f"{label}: {outcome['reason']}")
 
     if settings.device is not None:
-        from fogml.fleet.batched import run_batched
+        from fogml.fleet.engines import run_batched
 
         return run_batched(tasks, settings.batch, told)
     return run_tasks(tasks, workers=settings.workers, cluster=settings.cluster, progress=told)

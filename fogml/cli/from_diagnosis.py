@@ -17,7 +17,7 @@ from fogml.strict import Strict, strictly
 from fogml.strict_json import json_object, read_json
 
 if TYPE_CHECKING:
-    from fogml.cli.train import TrainSettings
+    from fogml.cli.model_commands import TrainSettings
     from fogml.models.base import DriftModel
     from fogml.models.causes import CauseModel
 

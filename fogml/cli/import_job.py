@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from fogml.cli.import_ import ImportSettings
+from fogml.cli.run_commands import ImportSettings
 from fogml.cli.runs import most_dropped
 from fogml.cli.terminal import Terminal, span
 from fogml.errors import InputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fogml.cli.inspect import InspectSettings
+from fogml.cli.run_commands import InspectSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
@@ -15,7 +15,7 @@ from fogml.report.words import duration
 from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
-from fogml.validation.strict import hold_strict
+from fogml.validation.limits import hold_strict
 
 
 def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:

@@ -32,7 +32,7 @@ class MisalignmentSettings(Settings):
     With --out, writes misalignment.json, misalignment.html and lab-misalignment.config.yaml.
     """
 
-    job: ClassVar[str] = "fogml.cli.lab_misalignment_job:misalignment_and_write"
+    job: ClassVar[str] = "fogml.cli.lab_jobs:misalignment_and_write"
     file: Annotated[
         str | None,
         argument(
@@ -68,7 +68,7 @@ class RateSettings(Settings):
     rate.html and lab-rate.config.yaml.
     """
 
-    job: ClassVar[str] = "fogml.cli.lab_rate_job:rate_and_write"
+    job: ClassVar[str] = "fogml.cli.lab_jobs:rate_and_write"
     runs: Annotated[
         list[str],
         argument("[RUN...]", "Runs on a rate table, with the column rate as commanded.", reads=True),
@@ -111,7 +111,7 @@ class NorthSettings(Settings):
     north.json, north.html and lab-north.config.yaml.
     """
 
-    job: ClassVar[str] = "fogml.cli.lab_north_job:north_and_write"
+    job: ClassVar[str] = "fogml.cli.lab_jobs:north_and_write"
     positions: Annotated[
         str | None,
         option("A run with a column position, 1 to 4, or the table's angle.", metavar="FILE", reads=True),
@@ -195,7 +195,7 @@ class BatchSettings(Settings):
     is not accepted.
     """
 
-    job: ClassVar[str] = "fogml.cli.lab_batch_job:batch_and_write"
+    job: ClassVar[str] = "fogml.cli.lab_acceptance_job:batch_and_write"
     reports: Annotated[
         list[str],
         argument("REPORT...", "Files acceptance.json, or the folders that hold them.", reads=True),

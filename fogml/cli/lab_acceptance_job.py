@@ -1,4 +1,4 @@
-"""The job of ``fogml lab acceptance``."""
+"""The jobs of ``fogml lab acceptance`` and ``fogml lab batch``."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fogml.cli.lab import AcceptanceSettings
-from fogml.cli.lab_outputs import say_where, tell
+from fogml.cli.lab import AcceptanceSettings, BatchSettings
+from fogml.cli.lab_jobs import say_where, tell
 from fogml.cli.runs import open_runs
-from fogml.cli.terminal import Terminal
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -48,7 +49,7 @@ def write_report(
         Called with the runs before they are tested.
     """
     from fogml.lab.acceptance import acceptance_json
-    from fogml.lab.acceptance_limits import read_limits
+    from fogml.lab.acceptance_rows import read_limits
 
     def make() -> dict[str, Any]:
         limits = None if settings.limits is None else read_limits(settings.limits)
@@ -100,3 +101,52 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         terminal.say(f"Not tested: {', '.join(lacking)}")
     _, sign, words = VERDICTS[values["verdict"]]
     terminal.say(f"{sign} {words}: {'; '.join(values['reasons'])}")
+
+
+def batch_and_write(settings: BatchSettings, terminal: Terminal) -> bool:
+    """Gather reports, write the batch where a folder is named, print it; whether all are accepted."""
+    from fogml.lab.acceptance import ACCEPTED
+    from fogml.lab.batch import batch_json, read_reports
+
+    if not settings.reports:
+        raise InputError("no report is given; name files acceptance.json, or the folders that hold them")
+
+    def make() -> dict[str, Any]:
+        home = None if settings.out is None else Path(settings.out)
+        return batch_json(read_reports(settings.reports), home)
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report.acceptance_page import batch_page
+
+        return batch_page(values, settings.title)
+
+    def sheets(values: dict[str, Any], path: Path) -> None:
+        from fogml.report.spreadsheets import batch_spreadsheet
+
+        batch_spreadsheet(values, path)
+
+    values = tell("batch", make, page, settings, settings.out, terminal, sheets)
+    _print_batch(values, terminal)
+    terminal.result(values)
+    say_where("batch", settings.out, terminal)
+    return values["counts"][ACCEPTED] == len(values["units"])
+
+
+def _print_batch(values: dict[str, Any], terminal: Terminal) -> None:
+    from fogml.report.acceptance_page import limit_words, verdict_sentences
+
+    rows = [
+        [
+            one["name"],
+            str(one["tested"]),
+            *(number(one["distribution"][part]) for part in ("median", "largest")),
+            one["unit"],
+            limit_words(one["limit"]),
+            str(one["over"]),
+        ]
+        for one in values["quantities"]
+    ]
+    heads = ["quantity", "units", "median", "largest", "unit", "limit", "over"]
+    terminal.table("Acceptance of a batch", heads, rows)
+    for sentence in verdict_sentences(values):
+        terminal.say(sentence)

@@ -22,36 +22,36 @@ from fogml.processes import end_as_interrupted, quiet_libraries
 
 COMMANDS = {
     "demo": (
-        ".demo:DemoSettings",
+        ".run_commands:DemoSettings",
         "Train and judge on a real recording that ships, then say what to open.",
     ),
     "import": (
-        ".import_:ImportSettings",
+        ".run_commands:ImportSettings",
         "Bring a logger's file into the run format, or draft a profile for it.",
     ),
     "inspect": (
-        ".inspect:InspectSettings",
+        ".run_commands:InspectSettings",
         "Say what is in a run: columns, span, gaps, soaks and ramps, faults.",
     ),
-    "train": (".train:TrainSettings", "Fit a drift model on some runs and judge it on others."),
+    "train": (".model_commands:TrainSettings", "Fit a drift model on some runs and judge it on others."),
     "compare": (
-        ".compare:CompareSettings",
+        ".model_commands:CompareSettings",
         "Judge every model and baseline on the same split, in one table.",
     ),
     "compensate": (
-        ".compensate:CompensateSettings",
+        ".model_commands:CompensateSettings",
         "Apply a model to a run of any length, in bounded memory.",
     ),
     "export": (
-        ".export:ExportJobSettings",
+        ".model_commands:ExportJobSettings",
         "Write a model's compact form, once it has been compared with the model.",
     ),
     "noise": (
-        ".noise:NoiseSettings",
+        ".run_commands:NoiseSettings",
         "Allan deviation and the IEEE 952 noise terms with intervals.",
     ),
     "sweep": (
-        ".sweep:SweepSettings",
+        ".model_commands:SweepSettings",
         "Search features, models and sizes on held-out parts of the training runs.",
     ),
     "lab": (
@@ -59,37 +59,40 @@ COMMANDS = {
         "Procedures of a laboratory: misalignment, rate table, north seeking, acceptance.",
     ),
     "fleet": (
-        ".fleet:FleetSettings",
+        ".unit_commands:FleetSettings",
         "Do the same job for every unit of a manifest, in parallel, here or on a cluster.",
     ),
     "monitor": (
-        ".monitor:MonitorSettings",
+        ".unit_commands:MonitorSettings",
         "Watch units in service: what their model leaves on each run, and since when that is another.",
     ),
     "app": (
-        ".app:AppSettings",
+        ".run_commands:AppSettings",
         "A page on this machine: drop files, choose, train, judge, diagnose, export.",
     ),
     "effects": (
-        ".effects:EffectsSettings",
+        ".twin_commands:EffectsSettings",
         "The catalogue of effects that a twin can have, or the card of one.",
     ),
-    "simulate": (".simulate:SimulateSettings", "A synthetic run from a programme and a twin."),
+    "simulate": (".twin_commands:SimulateSettings", "A synthetic run from a programme and a twin."),
     "replay": (
-        ".replay:ReplaySettings",
+        ".twin_commands:ReplaySettings",
         "A twin's output for a run's inputs, or what one effect changes.",
     ),
     "diagnose": (
-        ".diagnose:DiagnoseSettings",
+        ".twin_commands:DiagnoseSettings",
         "Where the gap between twin and recordings lies, which effect causes it, how far it closes.",
     ),
     "plan": (
-        ".plan:PlanSettings",
+        ".twin_commands:PlanSettings",
         "Programmes that make wanted parameters identifiable, with expected standard errors.",
     ),
     "blind": (".blind:COMMANDS", "The check on withheld effects: make cases, answer them, score."),
     "benchmark": (".benchmark:COMMANDS", "The open benchmark: make a round, let methods answer it, score."),
-    "docs": (".docs:DocsSettings", "The documentation, without a network: list, read, or write as one page."),
+    "docs": (
+        ".run_commands:DocsSettings",
+        "The documentation, without a network: list, read, or write as one page.",
+    ),
 }
 """Name of each command: where its settings are, and its help in one line."""
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fogml.cli.noise import NoiseSettings
+from fogml.cli.run_commands import NoiseSettings
 from fogml.cli.runs import check_named_once, open_run
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from fogml.cli.diagnose_job import rehearsal_rows
-from fogml.cli.plan import PlanSettings
 from fogml.cli.terminal import Terminal, number
+from fogml.cli.twin_commands import PlanSettings
 from fogml.gap.planning.plan import plan_runs
-from fogml.gap.planning.plan_json import plan_values, programme_file, simulation_file
-from fogml.gap.planning.plan_result import Plan
+from fogml.gap.planning.plan_result import Plan, plan_values, programme_file, simulation_file
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.facts import Facts, facts_from

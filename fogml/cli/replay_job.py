@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from fogml.cli.replay import ReplaySettings
+from fogml.arrays import FloatArray
 from fogml.cli.runs import open_run
 from fogml.cli.terminal import Terminal, number
+from fogml.cli.twin_commands import ReplaySettings
 from fogml.errors import InputError
 from fogml.json_files import check_finite
 from fogml.runs.columns import REPLAYED
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.simulated_output import at_times_of, is_simulator_output, read_gnss_ins_sim
 from fogml.runs.writing import BlockWriter, carried_cells, header_cells
 from fogml.twin.between_runs import Storage

@@ -5,8 +5,8 @@ from __future__ import annotations
 from contextlib import ExitStack
 from pathlib import Path
 
-from fogml.cli.simulate import SimulateSettings
 from fogml.cli.terminal import Terminal, span
+from fogml.cli.twin_commands import SimulateSettings
 from fogml.errors import InputError
 from fogml.runs.facts import facts_from
 from fogml.twin.between_runs import Storage

@@ -7,9 +7,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fogml.cli.model_commands import SweepSettings
 from fogml.cli.options import Repairing
 from fogml.cli.runs import open_legs, open_runs
-from fogml.cli.sweep import SweepSettings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import write_json

@@ -9,21 +9,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fogml.cli.from_diagnosis import unfitted_model
+from fogml.cli.model_commands import TrainSettings
 from fogml.cli.options import LimitSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal, Work, number
-from fogml.cli.train import TrainSettings
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.judge import judge
-from fogml.validation.limits import check_design_index, check_limits
+from fogml.validation.limits import check_design_index, check_limits, hold_strict
+from fogml.validation.metrics import check_turn_on_band
 from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement, RunJudgement
-from fogml.validation.strict import hold_strict
-from fogml.validation.turn_on import check_turn_on_band
 
 if TYPE_CHECKING:
     from fogml.cli.compare_job import CompareSettings
@@ -200,7 +199,7 @@ def _report(settings: TrainSettings, judgement: Judgement) -> dict[str, Any]:
     """The values of ``report.json``, with the cost in navigation where it is asked for."""
     values = judgement_json(judgement)
     if settings.navigation is not None:
-        from fogml.lab.navigation_cost import navigation_costs
+        from fogml.lab.navigation import navigation_costs
 
         values["navigation"] = finite_json(navigation_costs(judgement, settings.navigation))
     return values

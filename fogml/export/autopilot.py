@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.export.static_curve import StaticCurve
 
-FloatArray = NDArray[np.float64]
 PX4_FILE, ARDUPILOT_FILE = "fogml_px4.params", "fogml_ardupilot.param"
 ARDUPILOT_REFERENCE_DEGC = 35.0
 """TEMP_REFERENCE of ArduPilot: where its polynomials have their zero."""

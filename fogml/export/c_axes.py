@@ -13,11 +13,10 @@ from fogml.errors import InputError
 from fogml.escaping import CCode
 from fogml.export.c_float import literal, sensor_identifier
 from fogml.export.c_program import run_self_test, write_files
-from fogml.export.c_source import HEADER, SOURCE, templates
+from fogml.export.c_source import HEADER, SOURCE, project_files, templates
 from fogml.export.documentation import DOCUMENTATION_FILE
 from fogml.export.export import export_model
 from fogml.export.plan import Plan
-from fogml.export.project_files import project_files
 from fogml.export.settings import SCHEMA, ExportSettings, report_tail
 from fogml.export.tables import by_axis, read_matrix
 from fogml.models.base import DriftModel

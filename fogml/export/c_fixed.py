@@ -12,14 +12,12 @@ from math import factorial, floor, log, log2
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.escaping import CCode
+from fogml.export.c_flags import slice_comment, slice_inputs, slice_numbers, thermometer_rule
 from fogml.export.c_float import array, box_comment, box_numbers, sensor_identifier
 from fogml.export.c_own import fixed_number, function_atoms, own_constants, own_context
-from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
-from fogml.export.c_thermometers import thermometer_rule
 from fogml.export.fixed_scales import (
     HELD_BITS,
     OUTPUT_BITS,
@@ -37,8 +35,6 @@ from fogml.features.atoms import DEAD_BAND
 from fogml.features.own import Function
 from fogml.features.traced import BITS
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 EXP_ERROR = 3e-8
 """Greatest absolute error of the generated exponential, its argument's rounding included."""
 

@@ -6,13 +6,13 @@ from math import factorial, log
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, quoted
 from fogml.escaping import CCode, c_text
+from fogml.export.c_flags import slice_comment, slice_inputs, slice_numbers, thermometer_rule
 from fogml.export.c_own import function_atoms, own_constants, own_context
-from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
-from fogml.export.c_thermometers import thermometer_rule
 from fogml.export.layout import RANGE_BITS, Layout
 from fogml.export.plan import Limits, Plan
 from fogml.features.atoms import DEAD_BAND
@@ -20,7 +20,6 @@ from fogml.features.own import Function
 from fogml.features.signal import Signal, unit_of
 from fogml.runs.columns import is_temperature
 
-FloatArray = NDArray[np.float64]
 OTHER_LIMIT = 1e15
 """Values of other columns than temperatures up to this size, in their units, are taken."""
 EXP_TERMS = {"float64": 13, "float32": 7}

@@ -8,8 +8,8 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.escaping import CCode
 from fogml.export.layout import Layout, Operator
@@ -21,8 +21,6 @@ from fogml.features.traced import Symbol, Writer
 from fogml.runs.columns import is_temperature
 from fogml.signals.kernel_windows import Kernel
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Number = Callable[[float], str]
 CURVE_ERROR = 1e-7
 """How far a table may be from its curve, as a share of the curve's span."""

@@ -1,4 +1,4 @@
-"""C99 source of a plan: the header and the file that firmware engineers read."""
+"""C99 source of a plan: header and file that firmware engineers read, and what CMake, Arduino, Rust take."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fogml.export.c_float import float_context, input_units, literal, sensor_ide
 from fogml.export.layout import NOISE_TICKS, Layout, Number, layout
 from fogml.export.plan import Plan
 from fogml.export.self_test import SelfTest, make_self_test
-from fogml.features.bins import GAP_BINS, LOST, MOST_IN_BIN
+from fogml.features.windows import GAP_BINS, LOST, MOST_IN_BIN
 from fogml.runs.columns import is_temperature
 from fogml.signals.clock import LEAST_SHARE
 
@@ -235,3 +235,42 @@ def units_of(plan: Plan, gyro: str, temperature: str) -> list[str]:
             "T is the coil's temperature: T_in, or the mean of the inner sensors, if there is no other."
         )
     return lines
+
+
+RUST_FILE = "fogml_model.rs"
+_RUST = {"double": "f64", "float": "f32", "int32_t": "i32", "int16_t": "i16"}
+
+
+def project_files(name: str) -> dict[str, str]:
+    """A folder with ``NAME.c`` and ``NAME.h`` as a target of CMake and a library of Arduino, by file name."""
+    context = {"name": name, "version": __version__}
+    return {
+        file: templates().get_template(f"{file}.j2").render(context)
+        for file in ("CMakeLists.txt", "library.properties")
+    }
+
+
+def rust_bindings(source: CSource, state_bytes: int) -> str:
+    """A module of Rust that calls generated C through ``extern "C"``.
+
+    Parameters
+    ----------
+    source
+        The C.
+    state_bytes
+        Bytes of a state.
+    """
+    numbers = source.numbers
+    return (
+        templates()
+        .get_template("model.rs.j2")
+        .render(
+            kind=source.plan.kind,
+            version=__version__,
+            places=max(1, len(source.plan.sensors)),
+            state_bytes=state_bytes,
+            saves=bool(source.plan.atoms),
+            temperature=CCode(_RUST[numbers["temperature_type"]]),
+            gyro=CCode(_RUST[numbers["gyro_type"]]),
+        )
+    )

@@ -1,15 +1,14 @@
-"""What stands beside a model in a firmware file: formula, numbers, units, flags, test vectors, hashes."""
+"""What stands beside a model in a firmware file: card, formula, numbers, units, flags, tests, hashes."""
 
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.escaping import c_text
-from fogml.export.card import export_card
 from fogml.export.number_files import formula_of
 from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
@@ -18,7 +17,47 @@ from fogml.features.signal import unit_of
 from fogml.models.base import DriftModel
 from fogml.models.saved import model_hash
 
-FloatArray = NDArray[np.float64]
+
+def export_card(model: DriftModel, plan: Plan, pruning: dict[str, Any] | None) -> dict[str, Any]:
+    """What an export states of its model, JSON-ready."""
+    card = model.card_
+    return {
+        "kind": plan.kind,
+        "features": list(plan.names),
+        "unit": card.unit,
+        "axis": card.axis,
+        "training_runs": [{"name": run.name, "sha256": run.sha256} for run in card.runs],
+        "fogml_version": card.fogml_version,
+        "box": {
+            atom.text: [float(plan.limits.box_low[i]), float(plan.limits.box_high[i])]
+            for i, atom in enumerate(plan.atoms)
+        },
+        "half_width_90_deg_h": float(model.intervals_.half_width(0.9)),
+        "averaging_s": model.intervals_.averaging_s,
+        "earth_known": card.earth_known,
+        **({"pruned_to_bytes": pruning["bytes_asked"]} if pruning else {}),
+    }
+
+
+def card_lines(card: dict[str, Any], plan: Plan, dtype: str) -> list[str]:
+    """The card as lines of text."""
+    runs = card["training_runs"]
+    lines = [
+        f"gyro          {card['unit'] or 'not stated'}, axis {card['axis'] or 'not stated'}",
+        *(f"trained on    {run['name']}, SHA-256 {run['sha256'][:16]}..." for run in runs),
+        f"features      {', '.join(plan.names) or 'none'}",
+        *(f"trained box   {name}: {low:.6g} to {high:.6g}" for name, (low, high) in card["box"].items()),
+        f"accuracy      90 % of {card['averaging_s']:g} s averages within "
+        f"{card['half_width_90_deg_h']:.3g} deg/h,",
+        "              by parts of the training runs that were left out; not known outside the trained box",
+        f"numbers       {dtype}"
+        + (f", pruned to {card['pruned_to_bytes']} bytes of weights" if "pruned_to_bytes" in card else ""),
+    ]
+    if not card["earth_known"]:
+        lines.append("earth rate    not known in training: its part along the axis is taken for drift")
+    return lines
+
+
 DOCUMENTATION_FILE = "fogml_model.txt"
 _POINTS = (0.25, 0.5, 0.8)
 """Where in the trained box the test vectors lie, as shares of it."""

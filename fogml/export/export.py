@@ -8,29 +8,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.export.c_program import CProgram, cortex_m4_size, write_files
-from fogml.export.c_source import c_source, number_of
-from fogml.export.card import card_lines, export_card
+from fogml.export.c_program import CProgram, cortex_m4_size, instructions_per_sample, write_files
+from fogml.export.c_source import RUST_FILE, c_source, number_of, project_files, rust_bindings
 from fogml.export.check import (
     Difference,
+    TrainingRows,
+    accuracy_loss,
     c_difference,
     expected_outputs,
     pipeline_difference,
     plan_error,
+    training_rows,
     value_difference,
 )
-from fogml.export.documentation import DOCUMENTATION_FILE, documentation
+from fogml.export.documentation import DOCUMENTATION_FILE, card_lines, documentation, export_card
 from fogml.export.false_readings import false_reading_lines, false_readings
 from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
-from fogml.export.instructions import instructions_per_sample
 from fogml.export.layout import layout
-from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
 from fogml.export.plan import Plan
 from fogml.export.points import box_points
-from fogml.export.project_files import RUST_FILE, project_files, rust_bindings
 from fogml.export.prune import pruned
 from fogml.export.settings import (
     ExportSettings,
@@ -45,7 +44,6 @@ from fogml.export.storage import stored_plan, weight_bytes
 from fogml.models.base import DriftModel
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 CLOCK = {"unit": "us", "bits": [64, 32], "wraps": True, "longest_uptime_s": None}
 """C code's clock: unsigned, of which only differences are taken, so that uptime is unlimited (None)."""
 _PLAN_NOISE = 1e-9

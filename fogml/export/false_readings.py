@@ -6,15 +6,14 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.export.plan import Plan
 from fogml.export.points import box_points
 from fogml.features.atoms import RATE_UNIT_S, Atom
 from fogml.features.own import Recursion
 from fogml.runs.columns import is_temperature
 
-FloatArray = NDArray[np.float64]
 SECONDS = (0.0, 60.0, 300.0)
 """Times without a good reading [s] that the error is stated after."""
 _POINTS, _MOST_SIGNS = 256, 32

@@ -10,8 +10,8 @@ from __future__ import annotations
 from math import exp
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.export.c_fixed import EXP_ERROR, weight_units
 from fogml.export.c_own import KERNEL_BITS, kernel_steps
 from fogml.export.false_readings import atom_gain
@@ -29,12 +29,11 @@ from fogml.export.fixed_scales import (
 from fogml.export.layout import RANGE_BITS, Layout, Operator
 from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
-from fogml.features.memories import BEYOND, LAG, PLAY
+from fogml.features.operators import BEYOND, LAG, PLAY
 from fogml.features.traced import BITS
 from fogml.signals.clock import EDGE_TOLERANCE, LEAST_SHARE, told_share
 from fogml.signals.kernel_windows import Kernel
 
-FloatArray = NDArray[np.float64]
 _GYRO_DEG_H = 20.0
 _HELD, _OWN = 2.0**-HELD_BITS, 2.0**-BITS
 _SHARES = np.linspace(0.01, 1.0, 1000)

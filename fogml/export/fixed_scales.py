@@ -5,13 +5,11 @@ from __future__ import annotations
 from math import floor, frexp, log2
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 OUTPUT_BITS = 12
 """Outputs are multiples of 2**-12 deg/h."""
 VALUE_BITS = 30

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml import json_files, strict_json
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored, arrays_to_write
@@ -109,7 +110,7 @@ def read_mat(folder: Path, plan: Plan) -> Plan:
     return plan.with_arrays(_decoded(arrays, plan))
 
 
-def _decoded(arrays: Mapping[str, NDArray[Any]], plan: Plan) -> dict[str, NDArray[np.float64]]:
+def _decoded(arrays: Mapping[str, NDArray[Any]], plan: Plan) -> dict[str, FloatArray]:
     """Numbers from packed arrays, in the plan's shapes."""
     found = {}
     for name, like in plan.arrays.items():

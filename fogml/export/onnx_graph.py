@@ -6,21 +6,21 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml import __version__
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, first_line
-from fogml.export.onnx_slices import beyond_slice
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored
 from fogml.features.atoms import DEAD_BAND, Atom, evaluate
+from fogml.features.slices import Slices
 from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 
 if TYPE_CHECKING:
     import onnx
 
-FloatArray = NDArray[np.float64]
+
 OPSET, IR_VERSION = 17, 8
 ONNX_FILE = "fogml_model.onnx"
 BEYOND = {
@@ -166,12 +166,9 @@ def window_weights(plan: Plan) -> FloatArray:
             "leave out --with-pipeline"
         )
     weights = np.zeros((length, len(plan.sensors), len(rates)))
-    time = plan.sample_s * np.arange(2 * length - 1)
+    time = np.asarray(plan.sample_s * np.arange(2 * length - 1), dtype=np.float64)
     for place, sensor in enumerate(plan.sensors):
-        columns: dict[str, FloatArray] = {
-            name: np.zeros(len(time)) for name in ("time", "gyro", *plan.sensors)
-        }
-        columns["time"] = np.asarray(time, dtype=np.float64)
+        columns = {"time": time} | {name: np.zeros(len(time)) for name in ("gyro", *plan.sensors)}
         columns[sensor][length - 1] = 1.0
         answers = np.empty((len(rates), len(time)))
         evaluate(rates, Run("impulse", columns), plan.sample_s, list(answers))
@@ -224,6 +221,12 @@ class _Graph:
     def gather(self, value: str, places: Any) -> str:
         return self.add("Gather", [value, self.whole(list(places))], axis=1)
 
+    def outside(self, values: str, low: str, high: str) -> str:
+        """Whether any of a row's values (n, a) lies beyond its bounds, int64 (n)."""
+        past = self.add("Or", [self.add("Less", [values, low]), self.add("Greater", [values, high])])
+        whole = self.add("Cast", [past], to=7)  # TensorProto.INT64, as not every type can be the greatest
+        return self.add("ReduceMax", [whole], axes=[1], keepdims=0)
+
 
 def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> tuple[str, str]:
     """Feature columns (n, k), and whether a window's end lies outside the trained box, int64 (n)."""
@@ -238,17 +241,9 @@ def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> tuple[
         direction = graph.add("Sub", [up, down])
         atoms = graph.add("Where", [graph.constant(signs, np.bool_), direction, atoms])
     limits = plan.limits
-    past = graph.add(
-        "Or",
-        [
-            graph.add("Less", [atoms, graph.constant(limits.inner)]),
-            graph.add("Greater", [atoms, graph.constant(limits.outer)]),
-        ],
-    )
-    whole = graph.add("Cast", [past], to=7)  # TensorProto.INT64, as not every type can be the greatest
-    outside = graph.add("ReduceMax", [whole], axes=[1], keepdims=0)
+    outside = graph.outside(atoms, graph.constant(limits.inner), graph.constant(limits.outer))
     if limits.slices is not None:
-        outside = graph.add("Max", [outside, beyond_slice(graph, limits.slices, atoms)])
+        outside = graph.add("Max", [outside, _beyond_slice(graph, limits.slices, atoms)])
     low, high, margin, zero = (graph.constant(v) for v in (limits.low, limits.high, limits.margin, 0.0))
     over = graph.add("Max", [graph.add("Sub", [atoms, high]), zero])
     under = graph.add("Max", [graph.add("Sub", [low, atoms]), zero])
@@ -264,6 +259,25 @@ def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> tuple[
             value = graph.add("Mul", [value, factor])
         columns.append(value)
     return graph.add("Concat", columns, axis=1), outside
+
+
+def _beyond_slice(graph: _Graph, slices: Slices, atoms: str) -> str:
+    """Whether an input of atoms (n, a) lies beyond its trained range at this temperature, int64 (n)."""
+    level = graph.add("Sub", [graph.gather(atoms, [slices.level]), graph.constant(slices.first)])
+    share = graph.add("Div", [level, graph.constant(slices.width)])
+    most = graph.constant(slices.low.shape[1] - 1.0)
+    place = graph.add("Min", [graph.add("Max", [share, graph.constant(0.0)]), most])
+    place = graph.add("Squeeze", [graph.add("Cast", [place], to=7), graph.whole([1])])
+    inputs = []
+    for i, j in zip(slices.of, slices.less):
+        value = graph.gather(atoms, [i])
+        inputs.append(value if j < 0 else graph.add("Sub", [value, graph.gather(atoms, [j])]))
+    value = graph.add("Concat", inputs, axis=1)
+    low, high = (
+        graph.add("Gather", [graph.constant(np.ascontiguousarray(ends.T)), place], axis=0)
+        for ends in slices.bounds
+    )
+    return graph.outside(value, low, high)
 
 
 def _value(graph: _Graph, plan: Plan, stored: Mapping[str, Stored], columns: str) -> str:

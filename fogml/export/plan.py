@@ -8,22 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import Atom, AtomValues
-from fogml.features.box import OVERSHOOT, TOLERANCE, Box
+from fogml.features.box import OVERSHOOT, TOLERANCE, Box, reaching_box
 from fogml.features.features import Features
-from fogml.features.reach import reaching_box
 from fogml.features.slices import Slices
 from fogml.features.terms import Step, composition_plan
 from fogml.models.base import DriftModel
-from fogml.models.compact import Compact, affine
-from fogml.models.operations import operations_of_compact, operations_of_features
+from fogml.models.compact import Compact, affine, operations_of_compact, operations_of_features
 from fogml.models.rbf.network import Network
 from fogml.runs.dropouts import RULE, DropoutRule
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
 
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-6, 86_400.0
 """Sample intervals on board [s]: the clock counts microseconds; no unit is read more seldom than daily."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
 from fogml.features.atoms import AtomValues
@@ -19,7 +19,6 @@ from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import Run
 from fogml.signals.clock import EXPONENTIAL_SPAN
 
-FloatArray = NDArray[np.float64]
 POINTS = 4096
 _BEYOND = 0.2
 _LEAST_SPANS = 5.0

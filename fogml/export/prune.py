@@ -10,16 +10,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.export.storage import design, weight_bytes
 from fogml.features.parse import parse_features
 from fogml.features.terms import composition_plan
 from fogml.models.rbf.centres import orthogonal_least_squares
-
-FloatArray = NDArray[np.float64]
 
 
 def pruned(
@@ -81,7 +79,7 @@ def _fewer_centres(
     return fewer.with_arrays(arrays)
 
 
-def _with_centres(plan: Plan, kept: NDArray[np.intp]) -> Plan:
+def _with_centres(plan: Plan, kept: IndexArray) -> Plan:
     arrays = {
         name: values[kept] if name in ("centres", "widths", "weights") else values
         for name, values in plan.arrays.items()
@@ -120,7 +118,7 @@ def _with_terms(plan: Plan, names: list[str]) -> Plan:
     )
 
 
-def _chosen(columns: FloatArray, target: FloatArray, count: int, forced: int) -> NDArray[np.intp]:
+def _chosen(columns: FloatArray, target: FloatArray, count: int, forced: int) -> IndexArray:
     """Places of the columns chosen, the forced ones first."""
     size = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(size > 0.0, size, 1.0)

@@ -8,16 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.export.c_program import compiled_output, write_files
-from fogml.export.c_source import templates
-from fogml.export.project_files import project_files
+from fogml.export.c_source import project_files, templates
 from fogml.export.segments import Segments
 from fogml.json_files import write_json
 
-FloatArray = NDArray[np.float64]
 SCHEMA = "fogml.segments/1"
 CSV_FILE, JSON_FILE = "fogml_segments.csv", "fogml_segments.json"
 HEADER, SOURCE, DRIVER = "fogml_segments.h", "fogml_segments.c", "driver.c"

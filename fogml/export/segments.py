@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.export.static_curve import StaticCurve
 
-FloatArray = NDArray[np.float64]
 MOST_BREAKPOINTS = 64
 """A table of more is larger than the model that it stands for."""
 
@@ -150,7 +149,7 @@ def _projected(grid: FloatArray, wanted: FloatArray, inner: FloatArray) -> tuple
     return (basis @ seen - wanted).ravel(), jacobian
 
 
-def _places(grid: FloatArray, knots: FloatArray) -> NDArray[np.intp]:
+def _places(grid: FloatArray, knots: FloatArray) -> IndexArray:
     """The line between breakpoints that each temperature is on."""
     return np.clip(np.searchsorted(knots, grid, side="right") - 1, 0, len(knots) - 2)
 
@@ -174,7 +173,7 @@ def _square(grid: FloatArray, wanted: FloatArray, knots: FloatArray, values: Flo
     return float(np.sum((_hats(grid, knots) @ values - wanted) ** 2))
 
 
-def _chords(grid: FloatArray, wanted: FloatArray, count: int) -> NDArray[np.intp]:
+def _chords(grid: FloatArray, wanted: FloatArray, count: int) -> IndexArray:
     """Places of the breakpoints whose chords have the least sum of squared errors (Bellman)."""
     cost = np.sum([_chord_errors(grid, column) for column in wanted.T], axis=0)
     best, taken = cost[0], []

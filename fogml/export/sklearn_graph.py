@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, first_line
 from fogml.export.check import Difference, value_difference
 from fogml.export.onnx_graph import BEYOND, ONNX_FILE, OPSET, finished_model, session_of
@@ -62,7 +62,7 @@ def sklearn_difference(model: SklearnModel, plan: Plan, data: bytes, dtype: str,
     session = session_of(data)
     real = np.float64 if dtype == "float64" else np.float32
 
-    def off(columns: NDArray[np.float64], gyro: NDArray[np.float64]) -> NDArray[np.float64]:
+    def off(columns: FloatArray, gyro: FloatArray) -> FloatArray:
         (drift,) = session.run(["drift"], {"features": columns.astype(real)})
         return np.asarray(drift, dtype=np.float64) - predict_rows(model.regressor_, columns)
 

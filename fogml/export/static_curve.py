@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
 from fogml.features.own import Function, Recursion
 from fogml.runs.columns import is_temperature
 
-FloatArray = NDArray[np.float64]
 GRID = 401
 """Temperatures at which the curve is taken: a quarter of a degree over 100 degC."""
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.export.plan import Plan
 
-FloatArray = NDArray[np.float64]
 FLOATS = {"float64": np.float64, "float32": np.float32, "float16": np.float16}
 FILE_DTYPES = (*FLOATS, "int8")
 """Number formats of the files that hold numbers: JSON with safetensors, MATLAB, ONNX."""

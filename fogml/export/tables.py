@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, quoted
 from fogml.export import autopilot, segment_files
-from fogml.export.card import export_card
-from fogml.export.loss import averaged_loss, training_rows
+from fogml.export.check import averaged_loss, training_rows
+from fogml.export.documentation import export_card
 from fogml.export.plan import Plan
 from fogml.export.segments import Segments, segments
 from fogml.export.settings import SCHEMA, report_tail
@@ -22,7 +22,6 @@ from fogml.models.base import DriftModel
 from fogml.runs.run import Run
 from fogml.yaml_text import read_yaml
 
-FloatArray = NDArray[np.float64]
 AXES = ("x", "y", "z")
 TOLERANCE_SHARE = 0.05
 """Error of a table allowed unless stated, as a share of the model's 90 % half-width: 0.1 % more rms."""

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, known_are
-from fogml.features import curves as curves  # declares the curves that ship
-from fogml.features.memories import MEMORY_OPERATORS
+from fogml.features.operators import MEMORY_OPERATORS
 from fogml.features.own import Function, Recursion, own_operator
 from fogml.features.signal import TIME_ON, Signal, number_text
 from fogml.features.windows import DEFAULT_WINDOW, Window, windowed_values
@@ -20,8 +19,6 @@ from fogml.runs.run import Run
 from fogml.signals.clock import Clock
 from fogml.signals.memory import MemoryOperator
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 Operator = Literal["value", "lag", "play", "since_on", "beyond", "diff", "d", "sign"]
 
 OPERATORS: tuple[Operator, ...] = get_args(Operator)

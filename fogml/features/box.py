@@ -1,4 +1,11 @@
-"""The trained box: the range of each atom in the training rows, and the smooth limit beyond it."""
+"""The trained box: the range of each atom in the training rows, the smooth limit beyond it, and the reach.
+
+Beyond the box a model must fall back smoothly, so atoms level off just outside it; a quintic left
+to itself runs away within a few degrees. One kind of atom is let go on: rates and differences
+between sensors that enter a linear model to the first power only. The drift that they stand for
+(Shupe, Mohr) is linear in them, and a ramp twice as fast as in training needs twice the term.
+They level off one whole span outside the box. The sample is flagged all the same.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +13,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from fogml.features.atoms import Atom
+from fogml.features.terms import Term
 
 OVERSHOOT = 0.05
 """How far beyond the box limited values can go, as a share of its span."""
@@ -111,3 +118,35 @@ class Box:
             soft = margin * beyond / (margin + beyond)
             limited[rows, column] = np.where(atom[rows] > high, high + soft, low - soft)
         return limited, outside
+
+
+REACH = 1.0
+"""How far a linear model follows rates and gradients beyond the box, as a share of its span."""
+
+
+def reaching_box(box: Box, terms: Sequence[Term], atoms: Sequence[Atom]) -> Box:
+    """The box widened for the atoms that a linear model follows beyond it.
+
+    Parameters
+    ----------
+    box
+        The trained box of the atoms.
+    terms
+        Terms of the model.
+    atoms
+        The atoms they are made of, in the order of the box.
+    """
+    highest = dict.fromkeys(atoms, 0)
+    for term in terms:
+        for atom, power in term.factors:
+            highest[atom] = max(highest[atom], power)
+    followed = np.array([highest[atom] == 1 and is_rate_or_gradient(atom) for atom in atoms])
+    further = np.where(followed, REACH * box.span, 0.0)
+    return Box(box.low - further, box.high + further)
+
+
+def is_rate_or_gradient(atom: Atom) -> bool:
+    """Whether an atom is a temperature's change in time, or its difference between sensors."""
+    return atom.operator in ("d", "diff") or (
+        atom.operator in ("value", "lag", "play") and atom.signal.is_difference
+    )

@@ -7,18 +7,18 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import Atom, AtomValues, Memories, evaluate
-from fogml.features.box import Box
+from fogml.features.blocks import evaluate_measured, heeded_rows
+from fogml.features.box import Box, reaching_box
 from fogml.features.grammar import parse_terms
-from fogml.features.reach import reaching_box
 from fogml.features.signal import check_holds
 from fogml.features.slices import Slices
 from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
 from fogml.features.transformer import Transformer
-from fogml.features.unmeasured import evaluate_measured, heeded_rows
 from fogml.runs.dropouts import RULE, DropoutRule
 from fogml.runs.run import Run
 from fogml.runs.thermometer_limits import limits_from_dict
@@ -26,9 +26,6 @@ from fogml.runs.thermometer_limits import limits_from_dict
 if TYPE_CHECKING:
     from fogml.features.blocks import FeatureBlocks
     from fogml.features.stream import FeatureStream
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 class Features(Transformer):
@@ -247,7 +244,7 @@ class Features(Transformer):
 
         Inside the box they stay as they are; beyond it they level off, with a continuous first
         derivative, before 5 % of the span, so that models fall back smoothly. For a model that is
-        linear, rates and gradients are followed further: see `fogml.features.reach`.
+        linear, rates and gradients are followed further: see `fogml.features.box`.
 
         Parameters
         ----------

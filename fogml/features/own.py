@@ -19,16 +19,14 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.entry_points import loaded
 from fogml.errors import InputError
 from fogml.signals.clock import EXPONENTIAL_SPAN, check_window, longest_gap_s, needed_s
 from fogml.signals.kernel_windows import Kernel
 from fogml.signals.memory import MemoryOperator
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 GROUP = "fogml.operators"
 KINDS = ("s", "x", "1")
 """Kinds of parameters: a time, a number in the unit of the input, a plain number."""

@@ -7,13 +7,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, did_you_mean
 from fogml.runs.columns import KNOWN, REPLAYED, TIME_ON, coil_sensor_number, column_spec, is_temperature
 from fogml.runs.run import Run
-
-FloatArray = NDArray[np.float64]
 
 NOT_INPUTS = ("time", "gyro", REPLAYED)
 """Columns that no feature may be made of."""

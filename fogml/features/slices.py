@@ -13,15 +13,12 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.features.atoms import Atom
 from fogml.strict import Strict, strictly
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 SLICES = 32
 """Slices of the trained range of temperature: 3 degC of a range of 100 degC, some minutes of a ramp."""
@@ -82,7 +79,7 @@ class Slices:
             found |= (value < low[place]) | (value > high[place])
         return found
 
-    def _placed(self, atoms: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    def _placed(self, atoms: FloatArray) -> tuple[IndexArray, FloatArray]:
         """Slice of each row (n,), and the inputs' values (n, c)."""
         count = self.low.shape[1]
         share = np.clip((atoms[:, self.level] - self.first) / self.width, 0.0, count - 1.0)

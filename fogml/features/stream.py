@@ -7,18 +7,16 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import RATE_UNIT_S, Atom, Window, direction
 from fogml.features.features import Features
 from fogml.features.signal import TIME_ON, Signal
 from fogml.runs.columns import is_temperature
-from fogml.runs.thermometer_stream import ThermometerStream, Told
+from fogml.runs.dropouts import ThermometerStream, Told
 from fogml.signals import window_streams
 from fogml.signals.kernel_windows import KernelStream
-
-FloatArray = NDArray[np.float64]
 
 
 class StreamStep(NamedTuple):

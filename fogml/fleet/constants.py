@@ -13,16 +13,18 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.fleet.covariates import CovariateColumns, CovariateEffects, Covariates
+from fogml.intervals import SIGMA_PER_MEDIAN
 from fogml.models.box import learn_box
 from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
 from fogml.models.mixed_effects_basis import SizePriors
 from fogml.models.mixed_effects_model import averages_of, composed
 from fogml.models.prior import Prior
 from fogml.models.table import run_rows
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 FORM = "T^1..3, dT, T*dT"
 """The form that units are compared in, unless another is stated."""
@@ -275,7 +277,7 @@ def _begin(seen: Sequence[tuple[FloatArray, FloatArray]], width: int) -> tuple[F
     own = np.array(
         [np.linalg.solve(info + 1e-9 * np.trace(info) / width * np.eye(width), image) for info, image in seen]
     )
-    spread = np.median(np.abs(own - np.median(own, axis=0)), axis=0) * 1.4826
+    spread = np.median(np.abs(own - np.median(own, axis=0)), axis=0) * SIGMA_PER_MEDIAN
     least = 1e-6 * max(float(np.abs(own).max()), 1e-12)
     return np.median(own, axis=0), np.diag(np.maximum(spread, least) ** 2)
 

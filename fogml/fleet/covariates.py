@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.models.prior import Prior
-from fogml.runs.run import BoolArray, FloatArray
 from fogml.strict import Strict, strictly
 
 Covariates = Mapping[str, str]

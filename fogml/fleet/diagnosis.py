@@ -10,11 +10,11 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.fleet.shares import apart, bayes_factor, discoveries, prevalence, probability_of_difference
 from fogml.gap.result import NAMED
 from fogml.gap.settings import Priors
-from fogml.runs.run import FloatArray
 from fogml.signals.random_effects import random_effects
 from fogml.strict import Strict, strictly
 

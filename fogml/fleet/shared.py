@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
@@ -20,7 +21,7 @@ from fogml.models.mixed_effects_basis import SizePriors
 from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.prior import Prior, agreement, posterior
 from fogml.models.table import TrainingTable
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 COVERED = 0.25
 """Least share of the fleet's temperatures in a unit's runs if the fleet is followed beyond them."""

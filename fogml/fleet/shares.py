@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.signals.random_effects import random_effects
 
 _STEPS = 4000

@@ -13,6 +13,7 @@ from fogml.errors import InputError
 from fogml.fleet.constants import LEAST_UNITS, FleetConstants, UnitConstants, fleet_constants
 from fogml.fleet.diagnosis import line_diagnosis
 from fogml.fleet.tasks import DONE
+from fogml.intervals import SIGMA_PER_MEDIAN
 
 FLEET_SCHEMA = "fogml.fleet/1"
 _OUTLYING = 3.5
@@ -115,7 +116,7 @@ def _outliers(
     if len(judged) >= _LEAST_OUTLIER_UNITS:
         after = np.log([max(unit["after"], 1e-12) for unit in judged])
         middle = np.median(after)
-        spread = 1.4826 * float(np.median(np.abs(after - middle)))
+        spread = SIGMA_PER_MEDIAN * float(np.median(np.abs(after - middle)))
         for unit, value in zip(judged, after, strict=True):
             if spread > 0.0 and value - middle > _OUTLYING * spread:
                 told.append(

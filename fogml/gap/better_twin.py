@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from fogml.arrays import FloatArray
 from fogml.gap.causes import Card
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
@@ -20,15 +21,14 @@ from fogml.gap.result_parts import Counterfactual, Course
 from fogml.gap.rows import READ
 from fogml.gap.settings import Reported
 from fogml.gap.where import averages
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.noise_expectation import floor_square
 from fogml.twin.draws import parameter_values
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.nominal import NAMES
 from fogml.twin.plant.fit import PlantFit, fit_plant
 from fogml.twin.registry import effect
-from fogml.twin.twin import Twin
-from fogml.twin.uncertainty import Suspected, Uncertainty
+from fogml.twin.twin import Suspected, Twin, Uncertainty
 
 NOT_LINEAR = ("line", "power_cycles", "sensor_steps", "clock_skew")
 """Families that no size moves alone: of a phase of their own, or not in proportion to their size."""

@@ -8,13 +8,13 @@ from itertools import combinations
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap import thermal_families as thermal
 from fogml.gap.own_simulator import OwnEffect
 from fogml.gap.rows import READ, READ_GROUPS, Rows, slopes, through_nominal
 from fogml.gap.scene import Block, Build, Constants, Family, Scene, column_block, steps_are_coarse
 from fogml.gap.shapes import AT_AMPLITUDE, GridNode, grid
 from fogml.gap.unknown import unknown_families
-from fogml.runs.run import FloatArray
 from fogml.signals.bases import lag, rate
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.registry import effect

@@ -10,6 +10,7 @@ from itertools import islice
 import numpy as np
 from scipy.stats import chi2
 
+from fogml.arrays import FloatArray
 from fogml.gap.catalogue import nodes_of, signature_of
 from fogml.gap.field import Field, Member, apart
 from fogml.gap.how_far import Foretold
@@ -23,7 +24,6 @@ from fogml.gap.rows import Rows
 from fogml.gap.scene import Scene
 from fogml.gap.settings import Reported
 from fogml.gap.shapes import AT_AMPLITUDE, GridNode, is_angle
-from fogml.runs.run import FloatArray
 from fogml.runs.steps import FINEST_STEP_DEGC, WHOLE, recorded_step
 from fogml.twin.effect import Effect
 

@@ -9,12 +9,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.gap.frame import Setting, Whitening
 from fogml.gap.linear_gaussian import LinearGaussian, sign_gains, size_gains, wide_gains
 from fogml.gap.scene import Family, Scene
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect
 
@@ -152,10 +151,10 @@ class Group:
     Those are positive whose sign physics gives. Wide ones hold eigenvalues and eigenvectors, too.
     """
 
-    rows: NDArray[np.intp]
-    places: NDArray[np.intp]
+    rows: IndexArray
+    places: IndexArray
     grams: FloatArray
-    positive: NDArray[np.bool_]
+    positive: BoolArray
     modes: tuple[FloatArray, FloatArray] | None
 
     def gains(

@@ -10,12 +10,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.linear_gaussian import LinearGaussian, Posterior
 from fogml.gap.model import AnyModel, Constant
 from fogml.gap.rows import READ, READ_GROUPS, Rows, slopes, through_nominal
 from fogml.gap.scene import Scene, steps_are_coarse
 from fogml.gap.settings import NoiseSettings, Priors
-from fogml.runs.run import FloatArray
 from fogml.signals.bases import rate
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener

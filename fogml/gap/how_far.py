@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.field import Member
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
@@ -18,7 +19,6 @@ from fogml.gap.rows import Rows
 from fogml.gap.where import averages
 from fogml.intervals import Z90
 from fogml.runs.regimes import Regimes
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
 

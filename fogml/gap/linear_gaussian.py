@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.special import log_ndtr
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from fogml.runs.run import FloatArray, Run
+from fogml.arrays import FloatArray
+from fogml.runs.run import Run
 from fogml.twin.nominal import NAMES, UNITS, NominalConstants
 from fogml.twin.quantities import Grade, Quantity
 from fogml.twin.registry import effect, effects

@@ -9,8 +9,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.gap.field import Columns, Field
 from fogml.gap.frame import Setting
@@ -19,14 +19,12 @@ from fogml.gap.model import AnyModel
 from fogml.gap.rows import Rows
 from fogml.gap.settings import STANDARD, NoiseSettings
 from fogml.gap.unknown import unknown_families
-from fogml.runs.run import FloatArray, Run
+from fogml.intervals import MEDIAN_SIZE, Z50
+from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior, fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
-
-_MEDIAN = 0.6744897501960817
-"""Median of the size of a normal number of unit variance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +98,7 @@ def prior_of(
     warmth = _motion(noise_run, usable, settings)
     # Whatever the size: a static run tells N within a per cent, whatever was thought before. Roughly from
     # neighbouring samples; B and K in the ratios that were expected.
-    white = float(np.median(np.abs(np.diff(values)))) / 0.6745 / np.sqrt(2.0)
+    white = float(np.median(np.abs(np.diff(values)))) / MEDIAN_SIZE / np.sqrt(2.0)
     n = max(white * np.sqrt(float(np.median(np.diff(time))) / 3600.0), 1e-9)
     ratio = n / centre.N
     start = NoiseModel(n, max(centre.B, 1e-9) * ratio, max(centre.K, 1e-9) * ratio)
@@ -116,11 +114,11 @@ def prior_of(
     return NoisePrior(fit.model, tuple(np.exp(spread))), f"static run {noise_run.name}"
 
 
-def _usable(run: Run) -> NDArray[np.bool_]:
+def _usable(run: Run) -> BoolArray:
     return np.asarray(np.isfinite(run.gyro_deg_h) & np.isfinite(run.time))
 
 
-def _motion(run: Run, usable: NDArray[np.bool_], settings: NoiseSettings) -> FloatArray | None:
+def _motion(run: Run, usable: BoolArray, settings: NoiseSettings) -> FloatArray | None:
     """Temperature about its mean as a regressor of a static run, where it moves at all."""
     held = leading_temperature(run)
     if held is None:
@@ -191,7 +189,7 @@ def white_noise(rows: Rows, least: float, made: Sequence[FloatArray] = ()) -> fl
     columns = np.diff(np.concatenate([rows.constants, *made], axis=1), 2, axis=0)
     columns = columns / np.maximum(np.abs(columns).max(axis=0), np.finfo(float).tiny)
     left = second - columns @ np.linalg.lstsq(columns, second)[0]
-    found = float(np.median(np.abs(left))) / _MEDIAN / math.sqrt(6.0) * math.sqrt(rows.row_s / 3600.0)
+    found = float(np.median(np.abs(left))) / Z50 / math.sqrt(6.0) * math.sqrt(rows.row_s / 3600.0)
     return max(found, least)
 
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior, left_out_log_density
 from fogml.gap.result import Found, Unknown
 from fogml.gap.search import Explanation, Member
-from fogml.runs.run import FloatArray
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.gap.model import GyroModel
 from fogml.gap.own_simulator import OwnOnRun
 from fogml.gap.rows import BySample, Rows
 from fogml.gap.settings import STANDARD, RowSettings
 from fogml.runs.outliers import find_outliers
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.smoothing import Smoothness, at_points, smoothed, window_difference
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, nominal_columns
@@ -130,7 +130,7 @@ def _replay_errors(
     return np.column_stack(columns)
 
 
-def _usable(run: Run, settings: RowSettings) -> tuple[NDArray[np.bool_], dict[str, int]]:
+def _usable(run: Run, settings: RowSettings) -> tuple[BoolArray, dict[str, int]]:
     usable = np.ones(len(run), dtype=np.bool_)
     for values in run.columns.values():
         usable &= np.isfinite(values)
@@ -152,7 +152,7 @@ def _usable(run: Run, settings: RowSettings) -> tuple[NDArray[np.bool_], dict[st
     return usable, {why: n for why, n in masked.items() if n}
 
 
-def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float, short: float) -> NDArray[np.bool_]:
+def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float, short: float) -> BoolArray:
     """Even rows into which the model's memory [s] reaches from over a long gap."""
     hidden = np.zeros(len(time), dtype=np.bool_)
     jumps = np.flatnonzero(np.diff(run.time) > max(short * memory, 3.0 * run.sample_s))

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.field import Member
 from fogml.gap.frame import whitener_of
 from fogml.gap.how_far import Foretold
@@ -16,7 +17,6 @@ from fogml.gap.posterior import Judgement
 from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Unknown, Verdict
 from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries
 from fogml.gap.where import averages
-from fogml.runs.run import FloatArray
 from fogml.signals.bases import rate
 from fogml.signals.noise_expectation import floor_square
 from fogml.signals.whiteness import whiteness

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.pictures import AFTER, BEFORE, Panel, in_time
-from fogml.runs.run import FloatArray
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.gap.own_simulator import OwnEffect, OwnOnRun
 from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.runs.regimes import regimes
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.smoothing import Smoothness, at_points, window_difference
 from fogml.twin.effect import Effect, LoopEffect
 from fogml.twin.inputs import Inputs
@@ -74,7 +75,7 @@ class Rows:
     weight: FloatArray
     constants: FloatArray
     even: Inputs
-    kept: NDArray[np.bool_]
+    kept: BoolArray
     readings: Mapping[str, FloatArray]
     smoothness: Mapping[str, Smoothness]
     by_sample: BySample
@@ -211,8 +212,8 @@ class BySample:
     """Samples of a run, the even row that each is in, and their mean square about its middle [s^2]."""
 
     recorded: Inputs
-    row: NDArray[np.intp]
-    used: NDArray[np.bool_]
+    row: IndexArray
+    used: BoolArray
     counts: FloatArray
     spread: float
     cache: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)

@@ -11,9 +11,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter
 
+from fogml.arrays import FloatArray
 from fogml.gap.grids import Grids
 from fogml.gap.rows import READ, Rows
-from fogml.runs.run import FloatArray
 from fogml.runs.steps import recorded_step
 from fogml.signals.bases import lag
 from fogml.twin.effect import Effect

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from fogml.arrays import FloatArray
 from fogml.gap.field import Blocks, Field, Member
 from fogml.gap.linear_gaussian import log_sum_exp
-from fogml.runs.run import FloatArray
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 import numpy as np
 from scipy.special import expit
 
+from fogml.arrays import FloatArray
 from fogml.gap.grids import Grids
-from fogml.runs.run import FloatArray
 
 
 @dataclass(frozen=True)

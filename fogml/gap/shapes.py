@@ -15,8 +15,8 @@ from itertools import product
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.grids import STANDARD, Grids
-from fogml.runs.run import FloatArray
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Grade, Quantity
 

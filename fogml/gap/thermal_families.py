@@ -12,9 +12,9 @@ from itertools import combinations
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.rows import Rows
 from fogml.gap.scene import Block, Constants, Place, Scene, column_block
-from fogml.runs.run import FloatArray
 from fogml.signals.bases import bumps, lag, play, preisach, rate
 
 

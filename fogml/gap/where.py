@@ -12,12 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.result_parts import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
 from fogml.gap.rows import Rows
 from fogml.gap.settings import STANDARD, Reported
 from fogml.intervals import Z90
 from fogml.runs.regimes import Regimes
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import expected_mean_square
 from fogml.signals.noise_model import NoiseModel
 

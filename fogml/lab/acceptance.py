@@ -12,10 +12,8 @@ import numpy as np
 
 from fogml.errors import InputError, listed
 from fogml.json_files import finite_json
-from fogml.lab.acceptance_figures import Figure, figures_of, small_rates
-from fogml.lab.acceptance_limits import Limits
-from fogml.lab.acceptance_rows import QUANTITIES
-from fogml.lab.acceptance_soaks import soak_table
+from fogml.lab.acceptance_figures import Figure, figures_of, small_rates, soak_table
+from fogml.lab.acceptance_rows import QUANTITIES, Limits
 from fogml.models.table import usable_rows
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S

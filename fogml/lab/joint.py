@@ -16,11 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.models.table import usable_rows
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S
 from fogml.validation.metrics import Metrics, RunMetrics
 from fogml.validation.scale_factor import find_steps

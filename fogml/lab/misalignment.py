@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.lab.misalignment_errors import (
     ROUND_OFF,
@@ -31,7 +32,6 @@ from fogml.lab.misalignment_errors import (
     slope_noise,
 )
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, check_order, sense_of, solve
-from fogml.runs.run import FloatArray
 
 _CROSS_TILT_TEST = 0.01
 

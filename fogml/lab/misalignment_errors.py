@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import stats
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 
 LEVEL = 0.95
 """Confidence of intervals and of the region."""

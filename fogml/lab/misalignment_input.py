@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_segments import Rows, from_marks, from_rates, from_samples
@@ -29,7 +30,6 @@ from fogml.runs.facts import read_side_file, side_file
 from fogml.runs.parquet_files import parquet_marks
 from fogml.runs.raw_table import RawTable
 from fogml.runs.reading import file_format, read_table
-from fogml.runs.run import FloatArray
 
 SEGMENTS = ("before", "turn", "after")
 _NEEDED = ("state", "tilt", "rate")

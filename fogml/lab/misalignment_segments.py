@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG
 from fogml.runs.raw_table import numbered_row
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import LEAST_RATE_DEG_S, turning
-
-IndexArray = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

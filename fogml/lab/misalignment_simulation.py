@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_segments import Rows
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES
 from fogml.runs.facts import EARTH_RATE_DEG_H
-from fogml.runs.run import FloatArray
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from itertools import permutations
 import numpy as np
 from scipy import stats
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 
 STATES = (1, 2, 3, 4)
 DOCUMENT_ANGLES_DEG = (0.0, 180.0, 270.0, 90.0)

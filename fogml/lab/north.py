@@ -25,9 +25,9 @@ from functools import cached_property
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.runs.facts import EARTH_RATE_DEG_H
-from fogml.runs.run import FloatArray
 
 SENSES = {"cw": 1.0, "ccw": -1.0}
 DEFAULT_ORDER = (0.0, 90.0, 180.0, 270.0)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.lab.north import Drift, DriftError, Scheme, drift_error, horizontal_rate
 from fogml.lab.north_positions import NorthFix, north_from_positions
@@ -20,7 +21,7 @@ from fogml.lab.north_schemes import (
     ways_of_equal_time,
     wrapped,
 )
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 SCHEMA = "fogml.north/1"
 CIRCLE_DEG = np.arange(0.0, 360.0, 1.0)

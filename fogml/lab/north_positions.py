@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, known_are
 from fogml.lab.north import (
     DEFAULT_ORDER,
@@ -18,7 +19,7 @@ from fogml.lab.north import (
     horizontal_rate,
 )
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 METHODS = ("auto", "plain", "drift-observing")
 _SEEN = 3.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.lab.north import SENSES, Drift, Scheme, drift_error
-from fogml.runs.run import FloatArray
 
 Disturbance = Callable[[FloatArray, FloatArray], FloatArray]
 """Means [deg/h] of drift and noise over spans of time from power-on, shape (m,) to (..., m)."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.arrays import BoolArray, FloatArray
+from fogml.runs.run import Run
 from fogml.runs.turning import white_noise
 
 LEAST_ROWS = 4

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.runs.facts import Direction, Facts
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.programme import Programme
 from fogml.twin.set_up import Sensors

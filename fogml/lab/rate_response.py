@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.lab.rate_pieces import Oscillation, Plateaus
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 STRAIGHT = 0.01
 """Rms deviation from a straight line, over the step, of a straight flank; that of a lag's is 0.06."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.lab.rate_pieces import Plateaus
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.validation.scale_factor import find_steps
 
 LEAST_SPAN_DEGC = 5.0

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import IndexArray
 from fogml.lab.rate_pieces import ROUND_OFF_DEG_H, Plateaus, merged
 from fogml.validation.rate_ladder import LEAST_LEVELS, nonlinearity_ppm
 
@@ -136,12 +136,12 @@ def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | N
     return _line(kept, criteria), Range(float(np.abs(kept.rate).max()), exceeded, output)
 
 
-def _levels(plateaus: Plateaus) -> NDArray[np.intp]:
+def _levels(plateaus: Plateaus) -> IndexArray:
     """Number of each plateau's rate among those that differ, shape (k,)."""
     return np.unique(merged(plateaus.rate, plateaus.rate_error), return_inverse=True)[1]
 
 
-def _drift(plateaus: Plateaus, level: NDArray[np.intp]) -> float | None:
+def _drift(plateaus: Plateaus, level: IndexArray) -> float | None:
     """Steady drift of the bias by rates that come again [deg/h per s]; None where none does."""
     count = np.bincount(level)
     time, output = (

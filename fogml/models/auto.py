@@ -1,7 +1,7 @@
 """The automatic model: a mixed-effects model's shared part and simple forms, weighed on what is left out.
 
 Simple candidates are scored on averages of the training runs: blocks of their time are held out, and
-where there are several, each run in turn as well; `fogml.models.score.choose` picks one of them. It, a
+where there are several, each run in turn as well; `fogml.models.candidates.choose` picks one of them. It, a
 cubic in temperature and the mixed-effects model with its memories are then weighed on runs left out, or
 else on blocks of one run, and combined (`fogml.models.weights`); what is held out is limited to
 the box of the rows fitted to, as in use. The weights' sum is the skill that left-out parts confirm, down
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel, Evaluation
+from fogml.models.box import refusals
 from fogml.models.card import TrainingCard, checked_runs
 from fogml.models.compact import Compact
-from fogml.models.directions import refusals
 from fogml.models.feature_model import resolve_features
 from fogml.models.intervals import Intervals
 from fogml.models.trial import Trial

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
@@ -20,7 +21,7 @@ from fogml.models.card import TrainingCard, check_unit_and_axis
 from fogml.models.compact import Compact
 from fogml.models.intervals import Intervals
 from fogml.runs.plausible import refuse_twice
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 
 GOOD, OUTSIDE, NOT_FULL = 0, 1, 2

@@ -14,9 +14,10 @@ from typing import Protocol
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.features.atoms import Atom
 from fogml.features.features import Features
-from fogml.features.memories import beyond
+from fogml.features.operators import beyond
 from fogml.features.parse import parse_features
 from fogml.features.terms import Term
 from fogml.models.box import distance_outside, learn_box
@@ -25,7 +26,6 @@ from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import MixedEffects, linear_regressor
 from fogml.models.regressors import goes_on_linearly, predict_rows, refit
 from fogml.models.table import TrainingTable
-from fogml.runs.run import FloatArray
 
 LEAST_WEIGHT = 0.02
 """Weight below which a member is left out: it costs windows and operations, and tells next to nothing."""

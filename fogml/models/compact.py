@@ -1,20 +1,23 @@
-"""The one compact form of a fitted model: what every export writes, and what its cost is counted from."""
+"""The one compact form of a fitted model, what every export writes; and its operations at each sample."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.features.atoms import Atom
+from fogml.features.terms import Step
+from fogml.features.windows import ring_of
 from fogml.models.regressors import goes_on_linearly
 
 if TYPE_CHECKING:
     from fogml.models.rbf.network import Network
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,3 +79,47 @@ def compact_regressor(kind: str, regressor: Any) -> Compact:
             "--to onnx, which takes its features"
         )
     return Compact(kind, network, linear_beyond=goes_on_linearly(regressor))
+
+
+WINDOW_OPERATIONS = {"block": 8, "slope": 10, "exp": 6, "first": 4}
+"""Additions, multiplications and divisions of a window's value at a sample."""
+HELD_OPERATIONS = {"block": 14, "slope": 26}
+"""Those for each sample, or bin of samples, that a window holds; of one's own as many as a slope's."""
+EXPONENTIAL_OPERATIONS = 20
+
+
+def operations_of_features(atoms: Sequence[Atom], steps: Sequence[Step], sample_s: float) -> int:
+    """Additions, multiplications and divisions from a sample to feature columns, windows full.
+
+    Operators of one's own count for what they state.
+
+    Parameters
+    ----------
+    atoms, steps
+        What features are made of, and how.
+    sample_s
+        Sample interval [s].
+    """
+    count = 0
+    windows = {(atom.signal, atom.window, atom.operator == "diff") for atom in atoms if atom.window}
+    for _, window, _ in windows:
+        assert window is not None
+        alike = "slope" if window.own is not None else window.method
+        count += WINDOW_OPERATIONS[alike]
+        count += HELD_OPERATIONS.get(alike, 0) * ring_of([window], sample_s)[0]
+    count += sum(declared.operations for atom in atoms if (declared := atom.declared))
+    count += sum(2 * len(atom.signal.parts) - 1 for atom in atoms)
+    count += 4 * len(atoms)
+    return count + sum(len(step.atoms) - (step.column is None) for step in steps)
+
+
+def operations_of_compact(compact: Compact) -> int:
+    """The same from feature columns to drift, inside the trained box."""
+    network = compact.network
+    count = 2 * len(network.linear) + 1 + 2 * len(compact.scale)
+    centres, inputs = network.centres.shape
+    if centres:
+        edges = len(network.edge.columns)
+        along = 4 * inputs + 2 if edges else 0
+        count += centres * (4 * inputs + along + EXPONENTIAL_OPERATIONS + 2) + 2 * edges + inputs
+    return count

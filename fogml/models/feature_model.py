@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from sklearn.base import clone
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
@@ -24,12 +25,10 @@ from fogml.features.suits import check_suits
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
-from fogml.models.coefficient_errors import noise_covariance
 from fogml.models.compact import Compact, compact_regressor
 from fogml.models.folds import dealt_folds
-from fogml.models.intervals import Intervals
+from fogml.models.intervals import Intervals, interval_table, out_of_fold_intervals
 from fogml.models.linear import LinearRegressor
-from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.regressors import (
     fit_regressor,
     for_features,
@@ -41,11 +40,12 @@ from fogml.models.regressors import (
     regressor_to_saved,
     weight_bytes,
 )
+from fogml.models.row_noise import noise_covariance
 from fogml.models.table import RunRows, TrainingTable, row_count, run_rows, table_of_rows
 from fogml.models.tall_least_squares import Part
-from fogml.models.threads import one_thread
+from fogml.processes import one_thread
 from fogml.runs.columns import coil_sensor_number
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
 
 _EACH_SENSOR = "{sensor}"

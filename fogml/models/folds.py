@@ -11,14 +11,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, IndexArray
 from fogml.errors import InputError
 
 if TYPE_CHECKING:
     from fogml.models.table import TrainingTable
 
-IndexArray = NDArray[np.intp]
 Fold = tuple[IndexArray, IndexArray]
 """Indices of the rows fitted to, and of the rows held out."""
 FOLDS = 5
@@ -95,7 +94,7 @@ def run_folds(table: TrainingTable) -> list[Fold]:
     ]
 
 
-def _near(table: TrainingTable, held: NDArray[np.bool_], guard_s: float) -> NDArray[np.bool_]:
+def _near(table: TrainingTable, held: BoolArray, guard_s: float) -> BoolArray:
     near = np.zeros(len(table), dtype=bool)
     for number in np.unique(table.run_index[held]):
         rows = np.flatnonzero(table.run_index == number)

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
@@ -33,15 +34,15 @@ from fogml.features.signal import number_text
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
-from fogml.models.coefficient_errors import noise_covariance
 from fogml.models.compact import Compact, affine
 from fogml.models.feature_model import resolve_features
 from fogml.models.folds import dealt_folds
+from fogml.models.intervals import interval_table, out_of_fold_intervals
 from fogml.models.linear import LinearRegressor
-from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
+from fogml.models.row_noise import noise_covariance
 from fogml.models.table import RunRows, TrainingTable, row_count
 from fogml.models.tall_least_squares import PIECE_ROWS, Part
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.strict import Strict, strictly
 

@@ -13,13 +13,13 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.arrays import expect_arrays
 from fogml.models.compact import affine
 from fogml.models.folds import dealt_folds
 from fogml.models.parameters import check_parameters
 from fogml.models.tall_least_squares import Condensed, Part, condense
-from fogml.runs.run import FloatArray
 from fogml.strict import Strict, strictly
 
 if TYPE_CHECKING:

@@ -22,11 +22,11 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import minimize
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.features.terms import Term
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects_basis import ScaledColumns, SizePriors, basis_of
 from fogml.models.table import TrainingTable
-from fogml.runs.run import BoolArray, FloatArray
 
 _SMALLEST, _LARGEST, _LEAST_NOISE = 1e-4, 30.0, 2e-3
 # Bounds of sizes, for a well-conditioned covariance.

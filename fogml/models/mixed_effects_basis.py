@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.features.atoms import MEMORIES
 from fogml.features.terms import Term
-from fogml.runs.run import FloatArray
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class ScaledColumns(NamedTuple):
 
     shift: FloatArray
     mix: FloatArray
-    groups: NDArray[np.intp]
+    groups: IndexArray
     medians: FloatArray
 
 

@@ -12,6 +12,7 @@ from fogml.features.atoms import HYSTERESIS_DEGC
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.signal import TIME_ON, held_by
+from fogml.models.box import moves_both_ways
 from fogml.models.combination import (
     SharedMember,
     combined,
@@ -19,7 +20,6 @@ from fogml.models.combination import (
     left_out_parts,
     temperatures_of,
 )
-from fogml.models.directions import moves_both_ways
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.intervals import Intervals
 from fogml.models.linear import LinearRegressor

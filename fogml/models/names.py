@@ -65,7 +65,7 @@ def make_model(
     ----------
     name
         One of `MODEL_NAMES`, a scikit-learn regressor by its dotted name, or one that an installed package
-        declares (`fogml.models.own`) by its name there.
+        declares (`fogml.models.regressors`) by its name there.
     features
         Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent``, ``mixed-effects`` and
         dotted names; for ``joint`` of those that the bias depends on besides its own.
@@ -81,7 +81,7 @@ def make_model(
         If the name is not known, or features or parameters are stated for a model that fixes its own.
     """
     if "." not in name and name not in MODEL_NAMES:
-        from fogml.models.own import own_regressor, own_regressors
+        from fogml.models.regressors import own_regressor, own_regressors
 
         if name not in own_regressors():
             raise InputError(_unknown(name))
@@ -168,7 +168,7 @@ def _understood(features: str) -> str:
 
 
 def _unknown(name: str) -> str:
-    from fogml.models.own import own_regressors
+    from fogml.models.regressors import own_regressors
 
     known = (*MODEL_NAMES, *own_regressors())
     return (

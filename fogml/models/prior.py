@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 from fogml.strict import Strict, strictly
 
 _SPREADS = np.logspace(0.0, 8.0, 33)

@@ -18,27 +18,31 @@ A bare regressor has scikit-learn's ``fit(X, y)`` and ``predict(X)``. It may als
 ``to_saved()`` and ``from_saved(values, arrays)``
     JSON-ready values and arrays, and back, with ``n_features_in_``, the number of columns.
 
-Another package makes one known to the commands as `fogml.models.own` says.
+Another package makes one known to the commands by the entry point group ``fogml.regressors``: the entry
+point's name is the model's, ``--model NAME``; its class has ``to_saved`` and ``from_saved``. Only what an
+installed package declares so is ever loaded, whatever a file says.
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 
+from fogml.arrays import FloatArray
+from fogml.entry_points import loaded, origin
 from fogml.errors import FogmlError, InputError, first_line, quoted
 from fogml.features.features import Features
 from fogml.models.arrays import expect_arrays
 from fogml.models.folds import FOLDS
-from fogml.models.own import GROUP, own_regressor, own_regressors
 from fogml.models.table import TrainingTable
-from fogml.runs.run import FloatArray
 
 FORMS = {
     "linear": "fogml.models.linear:LinearRegressor",
@@ -48,6 +52,35 @@ FORMS = {
 """Forms of saved regressors, and where their classes are."""
 SKOPS = "skops"
 _PREDICTED_ROWS = 4096
+GROUP = "fogml.regressors"
+_NEEDED = ("fit", "predict", "to_saved", "from_saved")
+
+
+@cache
+def own_regressors() -> dict[str, EntryPoint]:
+    """The entry points of regressors that installed packages declare, by name; nothing is loaded yet."""
+    return {point.name: point for point in entry_points(group=GROUP)}
+
+
+def own_regressor(name: str) -> Any:
+    """The class of a regressor that an installed package declares.
+
+    Raises
+    ------
+    InputError
+        If it does not load, is no regressor that can be saved, or has the name of one of fogml's own.
+    """
+    point = own_regressors()[name]
+    place = f"{origin(point)} in group '{GROUP}'"
+    if name in FORMS or name == SKOPS:
+        raise InputError(f"{place}: '{name}' is a regressor of fogml's own; the package has to name another")
+    kind = loaded(point)
+    lacking = [each for each in _NEEDED if not hasattr(kind, each)]
+    if not inspect.isclass(kind) or lacking:
+        raise InputError(
+            f"{place}: {point.value} is no regressor; it lacks {', '.join(lacking) or 'a class'}"
+        )
+    return kind
 
 
 def for_features(regressor: Any, features: Features, atoms: Sequence[FloatArray]) -> Any:
@@ -111,7 +144,7 @@ def parameter_count(regressor: Any) -> int:
         return int(count() if callable(count) else count)
     if hasattr(regressor, "to_saved"):
         return sum(array.size for array in regressor.to_saved()[1].values())
-    from fogml.models.sklearn_size import numbers_of
+    from fogml.models.sklearn_saving import numbers_of
 
     return numbers_of(regressor)
 
@@ -119,7 +152,7 @@ def parameter_count(regressor: Any) -> int:
 def weight_bytes(regressor: Any) -> int:
     """Bytes of a fitted regressor's arrays; of a scikit-learn one, of those that it predicts from."""
     if _is_sklearn(regressor):
-        from fogml.models.sklearn_size import bytes_of
+        from fogml.models.sklearn_saving import bytes_of
 
         return bytes_of(regressor)
     return sum(array.nbytes for array in regressor_to_saved(regressor)[1].values())
@@ -137,9 +170,11 @@ def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArra
         from fogml.models.sklearn_saving import dump_sklearn
 
         return {"form": SKOPS}, {"skops": dump_sklearn(regressor)}
-    form = _form_among(FORMS, regressor) or _form_among(
-        {name: point.value for name, point in own_regressors().items()}, regressor
-    )
+    form = _form_among(FORMS, regressor)
+    if form is None:
+        form = _form_among({name: point.value for name, point in own_regressors().items()}, regressor)
+        if form in FORMS:
+            own_regressor(form)  # which refuses its name
     if form is not None:
         values, arrays = regressor.to_saved()
         return {"form": form, **values}, arrays

@@ -34,8 +34,7 @@ from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
 from fogml.models.intervals import Intervals
 from fogml.models.names import PRESETS
-from fogml.models.own import own_regressors
-from fogml.models.regressors import SKOPS
+from fogml.models.regressors import SKOPS, own_regressors
 from fogml.outputs import whole_folder
 from fogml.strict import Strict, strictly
 from fogml.strict_json import content_hash, json_object, read_bytes, read_json

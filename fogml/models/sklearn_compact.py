@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.models.compact import affine
 from fogml.models.rbf.network import Network
 
-FloatArray = NDArray[np.float64]
 _PROBES = 64
 _AFFINE = 1e-9
 """Departure from a straight line up to which a regressor counts as linear, as a share of its values."""

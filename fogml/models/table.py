@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.models.folds import dealt_blocks
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
 from fogml.signals.averages import block_averages
@@ -48,16 +48,16 @@ class TrainingTable:
 
     X: FloatArray
     y: FloatArray
-    run_index: NDArray[np.intp]
+    run_index: IndexArray
     time_s: FloatArray
-    block: NDArray[np.intp]
+    block: IndexArray
     averaging_s: float = 0.0
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.y)
 
-    def take(self, rows: NDArray[np.intp] | BoolArray) -> TrainingTable:
+    def take(self, rows: IndexArray | BoolArray) -> TrainingTable:
         """The table's rows at indices, or where a mask is True."""
         return replace(
             self,

@@ -29,10 +29,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.models.threads import available_cores, one_thread
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray, IndexArray
+from fogml.processes import available_cores, one_thread
 
 PIECE_ROWS = 4096
 _STREAMS = 8
@@ -60,7 +59,7 @@ class Part:
 
     target: FloatArray
     columns: Callable[[slice], FloatArray]
-    folds: NDArray[np.intp]
+    folds: IndexArray
 
     def pieces(self) -> Iterator[tuple[slice, int]]:
         """Slices of at most `PIECE_ROWS` rows of one fold, with the fold."""
@@ -78,7 +77,7 @@ class Condensed:
     """
 
     factors: tuple[FloatArray, ...]
-    counts: NDArray[np.intp]
+    counts: IndexArray
     shift: FloatArray
     scale: FloatArray
     y_shift: float

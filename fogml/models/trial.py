@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
-from fogml.models.box import learn_box
-from fogml.models.candidates import Candidate, candidates_for, candidates_of, union_of
-from fogml.models.directions import direction_is_told, moves_both_ways
-from fogml.models.folds import Fold, IndexArray, dealt_blocks, run_folds, time_folds
+from fogml.models.box import direction_is_told, learn_box, moves_both_ways
+from fogml.models.candidates import Candidate, Score, candidates_for, candidates_of, choose, union_of
+from fogml.models.folds import Fold, dealt_blocks, run_folds, time_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.rbf.rates import RATES_THAT_TELL, distinct_rates
 from fogml.models.regressors import (
@@ -24,9 +24,8 @@ from fogml.models.regressors import (
     parameter_count,
     predict_rows,
 )
-from fogml.models.score import Score, choose
 from fogml.models.table import RunRows, TrainingTable, recorded_s, run_rows
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 
 SCORED_ROWS = 2500
@@ -57,7 +56,7 @@ class Trial:
     several_runs
         Whether there are several runs, each of which is left out in turn.
     both_directions
-        Whether temperature moves both ways in the training runs (`fogml.models.directions`).
+        Whether temperature moves both ways in the training runs (`fogml.models.box`).
     direction_told
         Whether what its direction does is told beside what shifts a run; else simple forms hold no rates.
     """

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
-from fogml.models.box import learn_box
+from fogml.models.box import learn_box, moves_both_ways
 from fogml.models.candidates import Candidate
 from fogml.models.card import hash_ahead, training_card
 from fogml.models.combination import (
@@ -27,7 +28,6 @@ from fogml.models.combination import (
     left_out_parts,
     temperatures_of,
 )
-from fogml.models.directions import moves_both_ways
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import fit_mixed_effects, linear_regressor
@@ -35,7 +35,7 @@ from fogml.models.mixed_effects_model import averages_of, composed, offered, sta
 from fogml.models.table import TrainingTable, run_rows
 from fogml.models.trial import fit_candidate
 from fogml.models.weights import intervals_of, weights_of
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 STATIC = "cubic in T"
 """The member of temperature alone."""

@@ -26,10 +26,10 @@ from statistics import NormalDist
 import numpy as np
 from scipy.optimize import minimize
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.models.combination import LEAST_WEIGHT, LeftOut
 from fogml.models.intervals import LEVELS, Intervals, half_widths_of_runs, quantiles_of_parts
 from fogml.models.table import TrainingTable
-from fogml.runs.run import BoolArray, FloatArray
 
 UNSEEN_SHIFT = 2.0**0.5
 """Widening where no run can be left out: how a run is shifted from the next is not seen in one, and is taken

@@ -29,9 +29,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.monitor.evidence import SHAPES, ChangePrior, FigureEvidence, Shape
-from fogml.runs.run import FloatArray
 
 
 @dataclass(frozen=True)

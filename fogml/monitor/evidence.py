@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.stats import t as student
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray, IndexArray
 from fogml.signals.noise_model import flicker_ladder
 
 Shape = Literal["step", "ramp"]
@@ -127,7 +126,7 @@ class FigureEvidence:
         self._log_dets = np.cumsum(np.log(np.diagonal(self._roots, axis1=1, axis2=2)), axis=1)
         self._of_mean, self._of_values, self._squares = np.zeros((3, len(q), table.shape[1]))
 
-    def _shape(self, onsets: NDArray[np.intp], shape: int) -> FloatArray:
+    def _shape(self, onsets: IndexArray, shape: int) -> FloatArray:
         """What a change adds to each run, per size, for each onset; shape (n, m)."""
         after = np.arange(len(self._y))[:, None] >= onsets
         ramp = self._t[:, None] - self._t[onsets - 1]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import digamma, polygamma
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.models.base import DriftModel
-from fogml.runs.run import BoolArray, FloatArray
 from fogml.signals.noise_fit import NoiseFit, fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener

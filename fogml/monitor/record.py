@@ -8,15 +8,15 @@ from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import Z90
 from fogml.models.base import OUTSIDE, DriftModel
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
 from fogml.monitor.figures import Averages, run_figures
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
@@ -224,7 +224,7 @@ class _Means:
     def __init__(self, window_s: float) -> None:
         self.window_s = window_s
         self.start: float | None = None
-        self.parts: list[tuple[NDArray[np.int64], NDArray[np.int64], dict[str, FloatArray]]] = []
+        self.parts: list[tuple[IntArray, IntArray, dict[str, FloatArray]]] = []
         self.sample_s = 0.0
 
     def add(self, time: FloatArray, kept: BoolArray, **columns: FloatArray) -> None:
@@ -234,7 +234,7 @@ class _Means:
             self.sample_s = float(np.median(np.diff(time))) if len(time) > 1 else self.window_s
         window = np.floor((time[kept] - self.start) / self.window_s).astype(np.int64)
         names, place = np.unique(window, return_inverse=True)
-        counts: NDArray[np.int64] = np.bincount(place, minlength=len(names)).astype(np.int64)
+        counts: IntArray = np.bincount(place, minlength=len(names)).astype(np.int64)
         sums: dict[str, FloatArray] = {
             name: np.asarray(np.bincount(place, values[kept], minlength=len(names)), dtype=np.float64)
             for name, values in {"time": time, **columns}.items()

@@ -11,10 +11,10 @@ from typing import Literal
 import numpy as np
 from scipy.stats import t as student
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.monitor.changes import ChangePrior, Chart, Shape, change_chart
 from fogml.monitor.record import FIGURES, RunRecord
-from fogml.runs.run import FloatArray
 
 DAY_S = 86400.0
 NEAREST: dict[tuple[str, Shape], tuple[str, ...]] = {

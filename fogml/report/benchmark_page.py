@@ -7,8 +7,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from fogml.benchmark.diagnosis_score import FIGURES
-from fogml.benchmark.drift_score import ALL
+from fogml.benchmark.score import ALL, FIGURES
 from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.style import log_axis

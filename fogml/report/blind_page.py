@@ -8,14 +8,17 @@ from typing import Any
 from fogml.report.blind_tables import (
     by_form_table,
     by_reality_table,
+    confusion_plot,
     figure_text,
     headline,
     kind_words,
+    open_set_plot,
     reality_words,
+    reliability_plot,
+    strata_plot,
     value_text,
     wanted_text,
 )
-from fogml.report.figures_blind import confusion_plot, open_set_plot, reliability_plot, strata_plot
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, listed, number, percent, plural, stated

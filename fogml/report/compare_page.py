@@ -11,8 +11,7 @@ from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.page import Drawing, render
-from fogml.report.shading import segments_of, shade
-from fogml.report.style import log_axis, time_unit
+from fogml.report.style import log_axis, segments_of, shade, time_unit
 from fogml.report.tables import Row, Table
 from fogml.report.verdict import floor_told, own_noise, stated_limits, unseen, worst_run
 from fogml.report.words import MISSING, averages, listed, number, percent

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from fogml.arrays import FloatArray
 from fogml.report import style
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
 from fogml.report.words import number
-from fogml.runs.run import FloatArray
 from fogml.signals.drawn import min_max_indices
 from fogml.static_svg import Curve, line_figure
 from fogml.twin.pictures import RATE_DEGC, AllanCurve, Picture, RateCurve
@@ -49,7 +49,7 @@ def effect_page(
     Parameters
     ----------
     card
-        Schema ``fogml.effect/1``, as `fogml.twin.card.card_values` gives it.
+        Schema ``fogml.effect/1``, as `fogml.twin.pictures.card_values` gives it.
     pictures
         Its signature on programmes.
     curves

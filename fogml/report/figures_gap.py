@@ -10,13 +10,13 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from fogml.arrays import FloatArray
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import GapSegment, HowFar, RunSeries, TemperatureExcess
 from fogml.report import style
 from fogml.report.figures_judgement import STEADY_DEG_C_PER_MIN
 from fogml.report.page import Drawing
-from fogml.report.shading import regime_word, segments_of, shade
-from fogml.report.style import log_axis, time_unit
+from fogml.report.style import log_axis, regime_word, segments_of, shade, time_unit
 from fogml.report.words import averages, listed, number, plural
 from fogml.runs.regimes import Regimes
 from fogml.signals.drawn import DRAWN_POINTS, drawn, gap_starts, min_max_indices
@@ -91,7 +91,7 @@ def run_in_time(series: RunSeries, segments: Sequence[GapSegment], named: bool) 
         row_heights=[heights[panel] for panel in panels],
     )
 
-    def line(panel: str, values: NDArray[np.float64], name: str, **looks: Any) -> None:
+    def line(panel: str, values: FloatArray, name: str, **looks: Any) -> None:
         x, y = drawn(time, values, gaps=gaps)
         trace = go.Scatter(x=x, y=y, mode="lines", name=name, line=looks, showlegend=panel == "output")
         figure.add_trace(trace, row=panels.index(panel) + 1, col=1)
@@ -138,7 +138,7 @@ def regime_names(series: RunSeries) -> NDArray[np.str_]:
     return np.asarray(Regimes.names)[series.regime]
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 

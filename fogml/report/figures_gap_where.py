@@ -9,8 +9,7 @@ import plotly.graph_objects as go
 from fogml.gap.result_parts import Share, TemperatureExcess, TimescaleExcess
 from fogml.report import style
 from fogml.report.page import Drawing
-from fogml.report.shading import regime_word
-from fogml.report.style import log_axis
+from fogml.report.style import log_axis, regime_word
 from fogml.report.words import duration, listed, number, percent
 
 _STAGE_WORDS = {

@@ -10,10 +10,10 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.report import style
 from fogml.report.page import Drawing
-from fogml.report.shading import in_order, regime_word, segments_of, shade
-from fogml.report.style import log_axis, time_unit
+from fogml.report.style import in_order, log_axis, regime_word, segments_of, shade, time_unit
 from fogml.report.words import averages, number, percent
 from fogml.signals.drawn import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 from fogml.validation.results import AveragedSeries, RunJudgement
@@ -52,7 +52,7 @@ def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = Non
         row_heights=[heights[panel] for panel in panels],
     )
 
-    def line(panel: str, values: NDArray[np.float64], name: str, **looks: Any) -> None:
+    def line(panel: str, values: FloatArray, name: str, **looks: Any) -> None:
         x, y = drawn(time, values, gaps=gaps)
         trace = go.Scatter(x=x, y=y, mode="lines", name=name, line=looks, showlegend=panel != "temperature")
         figure.add_trace(trace, row=panels.index(panel) + 1, col=1)
@@ -129,10 +129,10 @@ def _band_words(judged: RunJudgement, interval: Mapping[str, Any] | None, clippe
     return " with the model's 90 % band about zero" + (f" ({'; '.join(told)})" if told else "")
 
 
-def _band(time: NDArray[np.float64], series: AveragedSeries, gaps: NDArray[np.intp]) -> go.Scatter:
+def _band(time: FloatArray, series: AveragedSeries, gaps: IndexArray) -> go.Scatter:
     """The prediction interval as one closed outline per stretch, so that no gap is filled."""
-    sides_x: list[NDArray[np.float64]] = []
-    sides_y: list[NDArray[np.float64]] = []
+    sides_x: list[FloatArray] = []
+    sides_y: list[FloatArray] = []
     pen_up = np.array([np.nan])
     for rows in np.split(np.arange(len(time)), gaps):
         points = max(DRAWN_POINTS * len(rows) // len(time), 4)
@@ -151,7 +151,7 @@ def _band(time: NDArray[np.float64], series: AveragedSeries, gaps: NDArray[np.in
     )
 
 
-def _mark_flagged(figure: go.Figure, time: NDArray[np.float64], series: AveragedSeries, row: int) -> None:
+def _mark_flagged(figure: go.Figure, time: FloatArray, series: AveragedSeries, row: int) -> None:
     for flag, (words, symbol, colour) in _FLAGS.items():
         rows = np.flatnonzero(series.flag == flag)
         if rows.size:

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
 from fogml.report.words import number
 
-FloatArray = NDArray[np.float64]
 TERM_WORDS = {
     "Q": "quantisation",
     "N": "angle random walk",

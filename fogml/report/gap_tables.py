@@ -17,7 +17,7 @@ from fogml.report.gap_words import (
     unit_words,
     with_error,
 )
-from fogml.report.shading import regime_word
+from fogml.report.style import regime_word
 from fogml.report.tables import Column, Row, Table
 from fogml.report.words import MISSING, averages, duration, number, percent
 from fogml.twin.registry import effects

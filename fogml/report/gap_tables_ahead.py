@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import CauseShare, Rehearsed, WhatIf
 from fogml.report.gap_words import interval_words, probability_words, title_of
-from fogml.report.shading import regime_word
+from fogml.report.style import regime_word
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, averages, number, percent
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from fogml.arrays import FloatArray
 from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.tables import Row, Table
@@ -189,9 +189,7 @@ def loop_between(first: AveragedSeries, second: AveragedSeries) -> Loop | None:
     return Loop(float(apart[widest]), float(middle[widest]), float(np.sqrt(np.mean(apart**2))))
 
 
-def _binned(
-    series: AveragedSeries, edges: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _binned(series: AveragedSeries, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
     counts = np.histogram(series.temperature, edges)[0].astype(np.float64)
     sums = np.histogram(series.temperature, edges, weights=series.before)[0]
     return sums / np.maximum(counts, 1.0), counts
@@ -279,8 +277,8 @@ def _line(
     figure: go.Figure,
     row: int,
     column: int,
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
+    x: FloatArray,
+    y: FloatArray,
     name: str,
     colour: str,
 ) -> None:

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.shading import Segment, in_order, regime_word, shade
-from fogml.report.style import rounded_up, time_unit
+from fogml.report.style import Segment, in_order, regime_word, rounded_up, shade, time_unit
 from fogml.report.tables import Noticed, Row, Table, noticed
 from fogml.report.words import MISSING, duration, listed, number, percent, plural, stated
 from fogml.runs.regimes import regimes
@@ -207,7 +206,6 @@ def _about(told: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
-FloatArray = NDArray[np.float64]
 RATE_WINDOW_S = 60.0
 _BRIDGED = 5.0
 """Averages are joined over gaps up to this many averaging times."""
@@ -301,7 +299,7 @@ def _rate_window(run: Run) -> float:
     return max(RATE_WINDOW_S, rounded_up(max(2.0 * run.sample_s, run.span_s / _AVERAGES, 1e-6)))
 
 
-def temperature_rates(run: Run) -> dict[str, tuple[FloatArray, FloatArray, NDArray[np.intp]]]:
+def temperature_rates(run: Run) -> dict[str, tuple[FloatArray, FloatArray, IndexArray]]:
     """Per temperature the times [s] and rates [degC/min] between averages, and where gaps end."""
     names = run.temperature_columns
     if not names:

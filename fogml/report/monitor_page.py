@@ -8,8 +8,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from fogml.fleet.summary import in_order_of_serial, label_of
-from fogml.report.figures_monitor import evidence, levels, run_figures, shown_figure
-from fogml.report.monitor_words import FIGURE_WORDS, alarm_words, calibration_words, state_words, unit_label
+from fogml.report.monitor_words import (
+    FIGURE_WORDS,
+    alarm_words,
+    calibration_words,
+    evidence,
+    levels,
+    run_figures,
+    shown_figure,
+    state_words,
+    unit_label,
+)
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table
 from fogml.report.words import number, percent, plural

@@ -1,12 +1,20 @@
-"""What `monitor.json` says, in sentences."""
+"""What `monitor.json` says, in sentences and figures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
 from fogml.fleet.summary import label_of
+from fogml.intervals import Z90
+from fogml.report import style
+from fogml.report.figures_fleet import serial_axis
+from fogml.report.page import Drawing
+from fogml.report.style import log_axis
 from fogml.report.words import number, plural
 
 FIGURE_WORDS = {
@@ -82,3 +90,183 @@ def _days(days: float | None) -> str:
 
 def _interval(low: float | None, high: float | None) -> str:
     return f"{number(low)} … {number(high)}"
+
+
+_UNITS = {
+    "level": "deg/h",
+    "temperature_slope": "deg/h/°C",
+    "rate_slope": "deg/h/(°C/min)",
+    "scatter": "deg/h",
+    "scale_factor": "ppm",
+}
+
+
+def run_figures(unit: Mapping[str, Any]) -> Drawing:
+    """Every figure over the unit's age, with the changes and the runs that they were noticed with."""
+    told = [name for name in FIGURE_WORDS if any(run[name] is not None for run in unit["runs"])]
+    figure = make_subplots(rows=len(told), cols=1, shared_xaxes=True, vertical_spacing=0.16 / len(told))
+    age = unit["age"]
+    for row, name in enumerate(told, start=1):
+        values = [shown_figure(run, name) for run in unit["runs"]]
+        figure.add_trace(
+            go.Scatter(
+                x=age,
+                y=values,
+                mode="lines+markers",
+                error_y={
+                    "type": "data",
+                    **_bars(unit["runs"], name),
+                    "color": style.TRAINING,
+                    "thickness": 1,
+                    "width": 2,
+                },
+                line={"color": style.TRAINING, "width": 1},
+                marker={"size": 7, "color": style.BLUE},
+                customdata=[run["run"] for run in unit["runs"]],
+                hovertemplate="%{customdata}<br>%{y:.4g}<extra></extra>",
+                showlegend=False,
+            ),
+            row=row,
+            col=1,
+        )
+        figure.update_yaxes(
+            title_text=f"{FIGURE_WORDS[name].replace('slope against the', 'slope,')}<br>[{_UNITS[name]}]",
+            title_font_size=11,
+            tickformat=".3~g",
+            row=row,
+            col=1,
+        )
+        if name == "scatter":
+            seen = [value for value in values if value is not None]
+            figure.update_yaxes(**log_axis(min(seen), max(seen)), row=row, col=1)
+        if name == "level":
+            half = unit["runs"][-1]["half_width"]
+            for end in (-half, half):
+                figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=1)
+        for alarm in unit["alarms"]:
+            if alarm["figure"] == name:
+                figure.add_vline(
+                    x=alarm["onset_age"], line={"color": style.VERMILION, "width": 2}, row=row, col=1
+                )
+                raised = alarm["raised_at_index"]
+                figure.add_trace(
+                    go.Scatter(
+                        x=[age[raised]],
+                        y=[values[raised]],
+                        mode="markers",
+                        marker=style.ring(16),
+                        showlegend=False,
+                        hoverinfo="skip",
+                    ),
+                    row=row,
+                    col=1,
+                )
+    figure.update_xaxes(title_text=_age_title(unit), row=len(told), col=1)
+    style.styled(figure, 90 + 150 * len(told))
+    changes = "; ".join(f"{FIGURE_WORDS[a['figure']]} since {onset_words(a)}" for a in unit["alarms"])
+    return Drawing(
+        figure,
+        alt=f"Figures of {plural(len(age), 'run')}. {'Changed: ' + changes if changes else 'No change'}.",
+        caption=(
+            "What the model leaves on each run; bars: how well the run tells it, 90 %. Red line: where a "
+            "change began; red circle: the run that it was noticed with. Dashed: the model's 90 % interval "
+            "for averages."
+        ),
+    )
+
+
+def _bars(runs: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:
+    """Ends of the intervals of 90 % of a figure's values, as people read them, beyond and below each."""
+    beyond, below = [], []
+    for run in runs:
+        value, error = shown_figure(run, name), run.get(f"{name}_se")
+        half = 0.0 if error is None else Z90 * error
+        if name == "scatter" and value is not None:
+            beyond.append(value * math.expm1(half))
+            below.append(-value * math.expm1(-half))
+        else:
+            beyond.append(half)
+            below.append(half)
+    return {"symmetric": False, "array": beyond, "arrayminus": below}
+
+
+def shown_figure(run: Mapping[str, Any], name: str) -> float | None:
+    """A figure of a run as people read it: the scatter itself, not its logarithm."""
+    value: float | None = run[name]
+    return math.exp(value) if name == "scatter" and value is not None else value
+
+
+def evidence(unit: Mapping[str, Any], limit: float) -> Drawing:
+    """The evidence of change after each run, against the limit."""
+    values = [max(value, 1e-2) for value in unit["statistic"]]
+    figure = go.Figure(
+        go.Scatter(
+            x=unit["age"],
+            y=values,
+            mode="lines+markers",
+            name="evidence of change",
+            line={"color": style.BLUE},
+            marker={"size": 6},
+        )
+    )
+    figure.add_hline(y=limit, line={"color": style.VERMILION, "dash": "dash", "width": 1.5})
+    figure.add_trace(
+        go.Scatter(
+            x=[None],
+            y=[None],
+            mode="lines",
+            name="limit",
+            line={"color": style.VERMILION, "dash": "dash", "width": 1.5},
+        )
+    )
+    figure.update_yaxes(title_text="evidence, logarithmic", **log_axis(min(values), max(*values, 2 * limit)))
+    figure.update_xaxes(title_text=_age_title(unit))
+    style.styled(figure, 300)
+    return Drawing(
+        figure,
+        alt=f"Evidence of change after each run, at most {max(values):.3g}, against a limit of {limit:g}.",
+        caption=(
+            f"Where nothing changes, the evidence passes the limit once in {limit:g} runs or less often. "
+            "After an alarm it begins anew with the runs since the change."
+        ),
+    )
+
+
+def levels(units: Sequence[Mapping[str, Any]]) -> Drawing:
+    """The last run's bias of every unit with the model's interval, changed units apart."""
+    labels = [unit_label(unit) for unit in units]
+    figure = go.Figure()
+    for state, symbol, colour in (("steady", "circle", style.GREEN), ("alarm", "x", style.VERMILION)):
+        some = [i for i, unit in enumerate(units) if (unit["state"] == "alarm") == (state == "alarm")]
+        if not some:
+            continue
+        last = [units[i]["runs"][-1] for i in some]
+        figure.add_trace(
+            go.Scatter(
+                x=[labels[i] for i in some],
+                y=[run["level"] for run in last],
+                mode="markers",
+                name="changed" if state == "alarm" else "not changed",
+                marker={"symbol": symbol, "size": 10, "color": colour},
+                error_y={
+                    "type": "data",
+                    "array": [run["half_width"] for run in last],
+                    "thickness": 1,
+                    "width": 2,
+                    "color": style.TRAINING,
+                },
+            )
+        )
+    serial_axis(figure, labels)
+    figure.update_yaxes(title_text="bias left by the model [deg/h]", tickformat=".3~g")
+    style.styled(figure, 380)
+    changed = sum(unit["state"] == "alarm" for unit in units)
+    return Drawing(
+        figure,
+        alt=f"Bias of the last run of {plural(len(units), 'unit')}; {changed} changed.",
+        caption="The last run of each unit; bars: the model's 90 % interval for averages.",
+    )
+
+
+def _age_title(unit: Mapping[str, Any]) -> str:
+    return "days since the first run" if unit["age_unit"] == "d" else "run number"

@@ -66,7 +66,7 @@ def train_page(
     documentation
         The block of text for a firmware file, where the model has a compact form.
     navigation
-        What the drift costs a navigator, as :func:`fogml.lab.navigation_cost.navigation_costs` gives it.
+        What the drift costs a navigator, as :func:`fogml.lab.navigation.navigation_costs` gives it.
 
     Returns
     -------
@@ -188,7 +188,7 @@ class NavigationSection:
 
 
 def navigation_sections(costs: Mapping[str, Any]) -> list[NavigationSection]:
-    """A section for each test run from what :func:`fogml.lab.navigation_cost.navigation_costs` gives."""
+    """A section for each test run from what :func:`fogml.lab.navigation.navigation_costs` gives."""
     return [
         NavigationSection(run["run"], navigation_figure(run, costs["latitude_deg"]), _table(run, costs))
         for run in costs["test"]

@@ -11,13 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.runs.findings import Finding
 from fogml.signals import large
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 LONG_INTERVALS = 1.5
 """An interval of more mean intervals than this lies between bursts."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.arrival_times import burst_ends, sampling_times
 from fogml.runs.clock_order import in_order
@@ -18,14 +18,20 @@ from fogml.runs.columns import TIME_ON, column_spec, conversion, parse_header
 from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
 from fogml.runs.other_rate import on_gyro_rows
-from fogml.runs.possible import clock_fault, faulty, float32_reason
+from fogml.runs.possible import (
+    REPAIR,
+    Rows,
+    clock_fault,
+    faulty,
+    finite_rows,
+    float32_reason,
+    order_error,
+    step_error,
+)
 from fogml.runs.raw_table import RawTable
-from fogml.runs.row_faults import REPAIR, Rows, finite_rows, order_error, step_error
 from fogml.runs.run import Run
 from fogml.runs.three_axes import SeveralAxes, axes_of
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 DROPPING = ("repaired_rows", "repaired_repeats")
 """Codes of the findings that count rows which are gone."""
 _MOST_NAMES = 20

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.signals import large
 
@@ -34,8 +34,6 @@ _LEAST_STEPS = 8
 _TAIL_RATIO = 3
 _RESTING_SAMPLES = 10
 _RESTING_RATIO = 10
-
-IndexArray = NDArray[np.intp]
 
 
 def check_run(run: Run) -> tuple[Finding, ...]:

@@ -11,15 +11,12 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import counted
 from fogml.runs.arrival_times import spread_stamps
 from fogml.runs.findings import Finding
 from fogml.signals import large
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 COUNTER_BITS = (16, 24, 31, 32)
 """Lengths of counters that wrap [bits]."""

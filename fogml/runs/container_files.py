@@ -15,23 +15,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, listed, printable, quoted
 from fogml.readers import reader_of
-from fogml.runs.beside import Beside, clock_s, interpolated
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.csv_dialect import is_sure
 from fogml.runs.csv_files import csv_blocks, read_csv
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
+from fogml.runs.other_rate import Beside, clock_s, interpolated
 from fogml.runs.raw_table import RawTable, choose_vectors, moment, stored_blocks
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.signals import large
-
-FloatArray = NDArray[np.float64]
 
 _INSTANCE = r"(\.\d+)?"
 _XYZ = ("x", "y", "z")

@@ -1,18 +1,16 @@
-"""Readings of a thermometer that are none: sentinels, values out of range, jumps that no heat makes."""
+"""Readings of a thermometer that are none (sentinels, out of range, jumps), in a run or sample by sample."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.intervals import MEDIAN_SIZE
 from fogml.signals import large
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 _STARTING = 9
 _LEAST_GOOD = 0.5
@@ -182,7 +180,7 @@ def _noise(values: FloatArray) -> float:
             yield np.abs(step[step != 0.0])
 
     middle = large.median(steps)
-    return 0.0 if np.isnan(middle) else middle / 0.6745
+    return 0.0 if np.isnan(middle) else middle / MEDIAN_SIZE
 
 
 def _first_good(time: FloatArray, values: FloatArray, ranged: BoolArray, rule: DropoutRule) -> int:
@@ -231,3 +229,48 @@ def believed(
     if rejected is None or (passed > rule.spell_s and value != rejected):
         return True
     return not abs(value - rejected) <= rule.continuing_degC + rule.rate_degC_s * (now_s - rejected_s)
+
+
+class Told(Enum):
+    """What a reading is.
+
+    ``FIRST``: nothing confirms it yet, and nothing before it counts. ``GOOD``: it goes on from the last
+    good one. ``MISSING``: it is none.
+    """
+
+    FIRST = 0
+    GOOD = 1
+    MISSING = 2
+
+
+class ThermometerStream:
+    """`fogml.runs.dropouts.read_thermometer` fed one reading at a time.
+
+    A recording's first readings are told by those around them, which are not known on board: there a first
+    reading that the next one contradicts is replaced by it. Noise beyond the rule's jump is not made up for.
+
+    Parameters
+    ----------
+    rule
+        What is none.
+    """
+
+    def __init__(self, rule: DropoutRule = RULE) -> None:
+        self._rule = rule
+        self._good = self._good_s = self._rejected_s = float("nan")
+        self._readings = 0
+        self._rejected: float | None = None
+
+    def read(self, time_s: float, value: float) -> Told:
+        """What a reading [degC] at a time [s] is."""
+        rule, known = self._rule, self._readings > 0
+        held = self._good, self._good_s, self._rejected, self._rejected_s
+        near = known and believed(rule, value, time_s, *held)
+        repeated = known and value == self._rejected
+        ranged = rule.low_degC <= value <= rule.high_degC
+        if not ranged or repeated or (self._readings > 1 and not near):
+            self._rejected, self._rejected_s = value, time_s
+            return Told.MISSING
+        self._good, self._good_s, self._rejected = value, time_s, None
+        self._readings = 2 if near else 1
+        return Told.GOOD if near else Told.FIRST

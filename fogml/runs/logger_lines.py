@@ -1,13 +1,74 @@
-"""The lines of a logger's text file, found and chosen in one piece."""
+"""The lines of a logger's text file, read in parts, found and chosen in one piece, and their fields."""
 
 from __future__ import annotations
 
+import codecs
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-IndexArray = NDArray[np.intp]
+from fogml.arrays import FloatArray, IndexArray
+from fogml.errors import InputError
+from fogml.runs.profile_parts import TextLayout
+from fogml.runs.raw_table import empty_file
+
+PART_BYTES = 1 << 23
+"""Bytes of a text that are looked into at once; a part takes some ten times as much memory."""
+
+
+def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[bytes, bool]]:
+    """Parts of a text, and whether each is the last one.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, is empty, or is no text of that encoding.
+    """
+    ready = begun = b""
+    read = 0
+    only_returns = False
+    decoder = codecs.getincrementaldecoder(encoding)()
+    try:
+        with path.open("rb") as file:
+            while raw := file.read(part_bytes):
+                text = _decoded(path, decoder, raw, read, encoding)
+                if read == 0:
+                    text = text.removeprefix("\ufeff")
+                    if "\0" in text[:4096]:
+                        raise InputError(f"{path.name}: this is a binary file, a text file was expected")
+                    only_returns = "\r" in text and "\n" not in text
+                text = text.replace("\r", "\n") if only_returns else text
+                read += len(raw)
+                content = begun + text.encode()
+                end = content.rfind(b"\n") + 1
+                if end and ready.strip():
+                    yield ready, False
+                    ready = b""
+                ready, begun = ready + content[:end], content[end:]
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    ready += begun + _decoded(path, decoder, b"", read, encoding).encode()
+    if not ready.strip():
+        raise empty_file(path.name)
+    yield ready, True
+
+
+def _decoded(path: Path, decoder: codecs.IncrementalDecoder, raw: bytes, read: int, encoding: str) -> str:
+    before = read - len(decoder.getstate()[0])
+    try:
+        return decoder.decode(raw, final=not raw)
+    except UnicodeError as error:
+        place = f"byte {before + error.start}" if isinstance(error, UnicodeDecodeError) else "it"
+        raise InputError(
+            f"{path.name}: {place} is no {encoding} text; "
+            "give the file's encoding in the profile (key 'encoding')"
+        ) from None
+
 
 _NEWLINE, _RETURN, _BLANK, _TAB, _STRAY = 10, 13, 32, 9, 31
 
@@ -78,3 +139,94 @@ def single_blanks(content: bytes) -> bytes:
     # A blank stays where something was left out between two characters of the same line.
     gap = (np.diff(places) > 1) & (kept[:-1] != _NEWLINE) & (kept[1:] != _NEWLINE)
     return np.insert(kept, np.flatnonzero(gap) + 1, _BLANK).tobytes()
+
+
+HIDDEN = "\x1a"
+"""Stands for a separator within quotation marks while a line's fields are told apart."""
+_QUOTED = re.compile(rb'"[^"\n]*"')
+
+
+def hide_quoted(content: bytes, separator: str | None) -> bytes:
+    """Lines whose separators within quotation marks are hidden, where one character separates."""
+    if separator is None or b'"' not in content:
+        return content
+    mark = separator.encode()
+    return _QUOTED.sub(lambda found: found[0].replace(mark, HIDDEN.encode()), content)
+
+
+def shown(text: str, separator: str | None) -> str:
+    """A text of hidden separators as it stands in the file."""
+    return text if separator is None else text.replace(HIDDEN, separator)
+
+
+def field_texts(content: bytes, profile: TextLayout, fields: int, position: int) -> NDArray[np.str_]:
+    """A source column as texts without blanks and quotation marks about them, shape (rows,)."""
+    import pyarrow as pa
+
+    (column,) = _fields(content, profile, fields, [position], pa.string(), []).columns
+    texts = np.char.strip(np.array(column.to_pylist(), dtype=np.str_), ' \t"')
+    mark = profile.text_separator
+    return texts if mark is None or b'"' not in content else np.char.replace(texts, HIDDEN, mark)
+
+
+def _fields(
+    content: bytes, profile: TextLayout, fields: int, positions: list[int], kind: Any, nulls: list[str] | None
+) -> Any:
+    """Fields by position, as Arrow reads them."""
+    import pyarrow as pa
+    from pyarrow import csv
+
+    separator = profile.text_separator
+    if separator is None:
+        content, separator = single_blanks(content), " "
+    names = [str(position) for position in range(fields)]
+    wanted = [names[position] for position in positions]
+    return csv.read_csv(
+        pa.BufferReader(content),
+        csv.ReadOptions(column_names=names),
+        # A mark that is not closed must not swallow the lines below it.
+        csv.ParseOptions(delimiter=separator, quote_char=False, ignore_empty_lines=False),
+        csv.ConvertOptions(
+            column_types=dict.fromkeys(wanted, kind),
+            include_columns=sorted(set(wanted)),
+            decimal_point=profile.decimal,
+            null_values=nulls,
+            strings_can_be_null=nulls is not None,
+        ),
+    )
+
+
+def field_numbers(content: bytes, profile: TextLayout, fields: int, positions: list[int]) -> FloatArray:
+    """The source columns as numbers, shape (columns, rows); NaN where there is none."""
+    import pyarrow as pa
+
+    if not positions:
+        return np.empty((0, content.count(b"\n")))
+    wanted = [str(position) for position in positions]
+    try:
+        columns = _fields(content, profile, fields, positions, pa.float64(), None)
+    except pa.ArrowInvalid:
+        # Some field is no plain number: read text, and let what is none become NaN.
+        text = _fields(content, profile, fields, positions, pa.string(), [""])
+        numbers = [_numbers(text[name], profile.decimal) for name in text.column_names]
+        columns = pa.table(numbers, names=text.column_names)
+    return np.stack([columns[name].to_numpy() for name in wanted])
+
+
+def _numbers(text: Any, decimal: str) -> Any:
+    """Text as float64, null where it is no number."""
+    import pyarrow as pa
+    import pyarrow.compute as compute
+
+    plain = compute.replace_substring_regex(compute.utf8_trim_whitespace(text), r'^"(.*)"$', r"\1")
+    plain = compute.utf8_trim_whitespace(plain)
+    # The decimal mark is stated, so that another one before three digits is one of thousands.
+    marks = f"[{'.' if decimal == ',' else ','}'{HIDDEN}\u00a0\u202f]"
+    groups = rf"^[-+]?[1-9]\d{{0,2}}({marks}\d{{3}})+({re.escape(decimal)}\d*)?$"
+    bare = compute.replace_substring_regex(plain, marks, "")
+    plain = compute.if_else(compute.match_substring_regex(plain, groups), bare, plain)
+    if decimal == ",":
+        plain = compute.replace_substring(compute.replace_substring(plain, ".", HIDDEN), ",", ".")
+    plain = compute.replace_substring_regex(plain, r"^\+", "")
+    valid = compute.match_substring_regex(plain, r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
+    return compute.cast(compute.if_else(valid, plain, pa.scalar(None, pa.string())), pa.float64())

@@ -8,14 +8,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted, quoted
-from fogml.runs.beside import interpolated
 from fogml.runs.columns import conversion, is_temperature
 from fogml.runs.container_files import container_columns, sheet_file
 from fogml.runs.findings import Finding
 from fogml.runs.logger_text import LoggerTable, read_logger_text
+from fogml.runs.other_rate import interpolated
 from fogml.runs.profile_parts import ImportColumn, JoinedLog, LegByState, LegByTime, RowFilter, TextLayout
 from fogml.runs.profile_schema import ImportProfile
 from fogml.runs.reading import file_format
@@ -23,8 +23,6 @@ from fogml.runs.stamps import Stamps
 from fogml.signals import large
 
 __all__ = ["chosen_rows", "internal", "interpolated", "joined_columns", "read_logger", "rows_of_leg"]
-
-FloatArray = NDArray[np.float64]
 
 
 def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
@@ -89,11 +87,11 @@ def chosen_rows(table: LoggerTable, profile: TextLayout) -> LoggerTable:
     return table
 
 
-def _is_one_of(values: FloatArray, numbers: Sequence[float]) -> NDArray[np.bool_]:
+def _is_one_of(values: FloatArray, numbers: Sequence[float]) -> BoolArray:
     return large.each(lambda part: np.isin(part, numbers), values, kind=bool)
 
 
-def _bridged(values: FloatArray, none: NDArray[np.bool_]) -> FloatArray:
+def _bridged(values: FloatArray, none: BoolArray) -> FloatArray:
     """Values, in the place of those that are none the line from the one before to the one behind."""
     filled = large.each(np.copy, values)
     changes = np.flatnonzero(none[1:] != none[:-1]) + 1
@@ -105,7 +103,7 @@ def _bridged(values: FloatArray, none: NDArray[np.bool_]) -> FloatArray:
     return filled
 
 
-def matching(table: LoggerTable, rule: RowFilter) -> NDArray[np.bool_]:
+def matching(table: LoggerTable, rule: RowFilter) -> BoolArray:
     """Which rows a filter keeps, shape (n,)."""
     if rule.texts:
         return np.isin(table.texts[rule.source], rule.texts)
@@ -120,7 +118,7 @@ def matching(table: LoggerTable, rule: RowFilter) -> NDArray[np.bool_]:
     return inside
 
 
-def rows_of_leg(table: LoggerTable, profile: ImportProfile, name: str, file: str) -> NDArray[np.bool_]:
+def rows_of_leg(table: LoggerTable, profile: ImportProfile, name: str, file: str) -> BoolArray:
     """Which rows belong to a leg, shape (n,).
 
     Raises

@@ -10,20 +10,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError, counted, listed, quoted
 from fogml.runs.csv_end import cut_error, cut_line
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
-from fogml.runs.logger_fields import field_numbers, field_texts, hide_quoted, shown
-from fogml.runs.logger_lines import Lines
-from fogml.runs.logger_parts import PART_BYTES, text_parts
+from fogml.runs.logger_lines import (
+    PART_BYTES,
+    Lines,
+    field_numbers,
+    field_texts,
+    hide_quoted,
+    shown,
+    text_parts,
+)
 from fogml.runs.other_rate import is_of_another_rate
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.stamps import StampClock, Stamps, stamps_of
 from fogml.signals import large
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 _SIGNATURE_LINES = 20
 
@@ -60,7 +64,7 @@ class LoggerTable:
     seconds: FloatArray | None = None
     stamps: Stamps | None = None
 
-    def kept(self, rows: NDArray[np.bool_] | slice, finding: Finding) -> LoggerTable:
+    def kept(self, rows: BoolArray | slice, finding: Finding) -> LoggerTable:
         """The table of some of its rows, with what is said of the others."""
         return replace(
             self,
@@ -107,7 +111,7 @@ class _Reader:
         self.hint = f"is this a file for the profile {quoted(profile_name)}?"
         self.lines_before = self.rows_before = 0
         self.clock: StampClock | None = None
-        self.filled: NDArray[np.bool_] | None = None
+        self.filled: BoolArray | None = None
         self.rejected: dict[str, Finding] = {}
 
     def read(self, parts: Iterator[tuple[bytes, bool]]) -> LoggerTable:
@@ -145,7 +149,7 @@ class _Reader:
         """A line as it stands in the file."""
         return shown(lines.line(number), self.profile.text_separator)
 
-    def _used(self, lines: Lines, first: bool) -> NDArray[np.bool_]:
+    def _used(self, lines: Lines, first: bool) -> BoolArray:
         """Which lines of a part are neither blank, nor comments, nor above the header."""
         profile = self.profile
         mark = lines.first_bytes()
@@ -267,7 +271,7 @@ class _Reader:
         compared = {source: texts[source] for source in self.profile.compared_texts}
         return LoggerTable(dict(zip(sources, values)), rows, len(numbers), (), compared, seconds)
 
-    def _reject(self, what: str, rows: NDArray[np.bool_]) -> None:
+    def _reject(self, what: str, rows: BoolArray) -> None:
         """Count rejected rows; `rows` (n,) marks them among the data rows of a part."""
         before = self.rejected.get(what)
         count = int(np.count_nonzero(rows)) + (before.count if before else 0)
@@ -293,7 +297,7 @@ class _Reader:
             self.clock = StampClock(stamps, self.file)
         return self.clock.seconds([pa.array(column, pa.string()) for column in columns])
 
-    def _filled(self, places: dict[str | int, int], values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _filled(self, places: dict[str | int, int], values: FloatArray) -> BoolArray:
         """Which sources have a value in every row: those of another rate are empty in most, evenly so."""
         clock = self.profile.columns["time"].number if "time" in self.profile.columns else None
         kinds = zip(places, values, strict=True)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.runs.noise_series import (
     NoiseSeries,
@@ -18,7 +19,7 @@ from fogml.runs.noise_series import (
     spectrum_of_runs,
 )
 from fogml.runs.noise_words import doubts_of, gaps_of, model_told, words_of
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals import large
 from fogml.signals.allan import AllanResult, allan_deviation
 from fogml.signals.averages import block_averages

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.intervals import Z90
 from fogml.runs.noise_series import NoiseSeries
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.noise_terms import NoiseTerms
 from fogml.signals.stationarity import Stationarity
 

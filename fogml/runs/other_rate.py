@@ -1,17 +1,16 @@
-"""Columns of another rate than the gyro's, empty in most rows, brought to the gyro's rows at true times."""
+"""Columns of another rate than the gyro's, in its rows or beside them, brought to its rows at true times."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.runs.columns import DUTY, column_spec
+from fogml.arrays import FloatArray, IndexArray
+from fogml.runs.columns import DUTY, column_spec, conversion, parse_header
 from fogml.runs.findings import Finding
+from fogml.runs.reader_process import StoredArray, StoredFile
 from fogml.signals import large
-
-FloatArray = NDArray[np.float64]
 
 EMPTY_SHARE = 0.4
 """Share of empty rows from which on a column may be one of another rate."""
@@ -33,7 +32,7 @@ def is_of_another_rate(values: FloatArray) -> bool:
 
 def on_gyro_rows(
     columns: Mapping[str, FloatArray],
-) -> tuple[dict[str, FloatArray], NDArray[np.intp], tuple[Finding, ...]]:
+) -> tuple[dict[str, FloatArray], IndexArray, tuple[Finding, ...]]:
     """Columns of another rate, interpolated in time between their own values, on the gyro's rows.
 
     Between two values of a duty or a switch the earlier one is held. Before the first value and after
@@ -89,3 +88,78 @@ def _at(time: FloatArray, known: FloatArray, values: FloatArray, hold: bool) -> 
     apart = known[after] - known[before]
     hole = (apart > LONGEST_HOLE * float(np.median(np.diff(known)))) & (time != known[before])
     return np.where(hole, np.nan, found)
+
+
+def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:
+    """Values of one rate at the times of another; the first and last are held beyond."""
+    sound = np.isfinite(at) & np.isfinite(values)
+    if not sound.any():
+        return np.full(len(seconds), np.nan)
+    order = np.argsort(at[sound], kind="stable")
+    known_s, known = at[sound][order], values[sound][order]
+    return large.each(lambda part: np.interp(part, known_s, known), seconds)
+
+
+def clock_s(cell: str, file: str) -> float:
+    """Seconds in one unit of a clock, by its header cell."""
+    return conversion("time", parse_header(cell)[1], file)[0]
+
+
+class Beside:
+    """A column of another group, read forward as the blocks of the run want it.
+
+    Held of it are the values about the block's times; all of it where its own clock or the run's goes back.
+
+    Parameters
+    ----------
+    cell
+        Its header cell.
+    clock
+        Header cell and array of its times.
+    array
+        Where it is stored.
+    step
+        Values read at once.
+    """
+
+    def __init__(
+        self, cell: str, clock: tuple[str, StoredArray], array: StoredArray, step: int = 1 << 16
+    ) -> None:
+        self.cell, self.array, self.step = cell, array, step
+        self.clock, self.times = clock
+        self.count = min(max(self.times.shape), max(array.shape))
+        self.read, self.is_whole = 0, False
+        self.at_s, self.values = np.empty(0), np.empty(0)
+
+    def at(self, stored: StoredFile, seconds: FloatArray) -> FloatArray:
+        """The column at the times of a block, which comes after the block before."""
+        sound = seconds[np.isfinite(seconds)]
+        if not len(sound):
+            return np.full(len(seconds), np.nan)
+        if self.read > len(self.at_s) > 0 and sound.min() < self.at_s[0]:
+            self._all(stored)
+        while self.read < self.count and not (len(self.at_s) and self.at_s[-1] >= sound.max()):
+            self._next(stored)
+        found = interpolated(seconds, self.at_s, self.values)
+        if not self.is_whole:
+            kept = max(int(np.searchsorted(self.at_s, sound.max(), side="right")) - 1, 0)
+            self.at_s, self.values = self.at_s[kept:], self.values[kept:]
+        return found
+
+    def _next(self, stored: StoredFile) -> None:
+        stop = min(self.read + self.step, self.count)
+        at = stored.read(self.times, self.read, stop) * clock_s(self.clock, stored.path.name)
+        values = stored.read(self.array, self.read, stop)
+        sound = np.isfinite(at) & np.isfinite(values)
+        before = self.at_s[-1:]
+        self.at_s = np.concatenate([self.at_s, at[sound]])
+        self.values = np.concatenate([self.values, values[sound]])
+        self.read = stop
+        if not self.is_whole and np.any(np.diff(np.concatenate([before, at[sound]])) < 0.0):
+            self._all(stored)
+
+    def _all(self, stored: StoredFile) -> None:
+        stored.limits.check_size(stored.path, 2.0 * self.count)
+        self.is_whole, self.read, self.step = True, 0, self.count
+        self.at_s, self.values = np.empty(0), np.empty(0)
+        self._next(stored)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray, IndexArray
+from fogml.intervals import Z50
 from fogml.signals import large
 
 OUTLIER_SIGMA = 8.0
@@ -16,15 +16,13 @@ _HALF = 2
 _SHARE = 0.9
 _WITHIN = 1.6174
 """90 % of white noise of unit standard deviation lies this near to the median of five (simulated)."""
-_BEND_WITHIN = 0.6744897501960817 * 6.0**0.5
+_BEND_WITHIN = Z50 * 6.0**0.5
 """Half of its second differences, of variance 1 + 4 + 1, are as small."""
 _BLOCK = 1024
 _CHUNK = 1 << 14
 
 
-def find_outliers(
-    gyro: FloatArray, rate_deg_s: FloatArray | None = None
-) -> tuple[NDArray[np.intp], FloatArray]:
+def find_outliers(gyro: FloatArray, rate_deg_s: FloatArray | None = None) -> tuple[IndexArray, FloatArray]:
     """Samples over 8 robust sigma off the median of the five samples about them, in O(n).
 
     That median follows drift, ramps and steps: where samples only rise or only fall it is the

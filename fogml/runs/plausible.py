@@ -9,9 +9,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.intervals import SIGMA_PER_MEDIAN
 from fogml.runs.findings import Finding
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.turning import turning
 from fogml.signals import large
 
@@ -188,7 +190,7 @@ def _earth_rate(run: Run, gyro: FloatArray) -> Iterator[Finding]:
         return
     at_rest = large.chosen(gyro, rest)
     mean = large.median(large.parts_of(at_rest))
-    scatter = 1.4826 * large.median(large.parts_of(at_rest, lambda part: np.abs(part - mean)))
+    scatter = SIGMA_PER_MEDIAN * large.median(large.parts_of(at_rest, lambda part: np.abs(part - mean)))
     why = None
     if abs(mean + earth) < NEAR_EARTH_RATE * abs(earth):
         why = _why(-1.0)

@@ -1,17 +1,19 @@
-"""Numbers that no recording holds: missing, infinite, beyond any sensor; clocks that no logger has."""
+"""Numbers and rows that no recording holds: missing, infinite, beyond any sensor; clocks of no logger."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
+from fogml.runs.clock_order import Ordered
 from fogml.runs.columns import column_spec
+from fogml.runs.findings import Finding
 from fogml.signals import large
-
-FloatArray = NDArray[np.float64]
 
 GREATEST = 1e20
 """Values beyond this, in any unit of the run format, are faults; a count of 64 bits is below it."""
@@ -23,7 +25,7 @@ ROUGH_STEP = 0.1
 """Single precision is too rough for a clock where its numbers lie more of a mean interval apart."""
 
 
-def faulty(name: str, values: FloatArray) -> NDArray[np.bool_] | None:
+def faulty(name: str, values: FloatArray) -> BoolArray | None:
     """Which values of a column of the run format no recording holds, shape (n,); None where all are sound."""
     if column_spec(name) is None or len(values) == 0:
         return None
@@ -188,3 +190,59 @@ def check_columns(run: str, columns: Mapping[str, FloatArray]) -> None:
         )
     if fault := clock_fault(time):
         raise InputError(f"{run}, column 'time': {fault}")
+
+
+REPAIR = "--repair"
+
+
+class Rows(NamedTuple):
+    """How messages name the rows of a table: base name of the file, and a row by its number from 0."""
+
+    file: str
+    row_name: Callable[[int], str]
+
+
+def finite_rows(
+    table: Rows, columns: Mapping[str, FloatArray], rows: IndexArray, repair: bool
+) -> tuple[IndexArray, Finding | None]:
+    """Rows whose values of the run format are all numbers that a recording can hold."""
+    bad: BoolArray | None = None
+    for name, values in columns.items():
+        found = faulty(name, values)
+        if found is None:
+            continue
+        if not repair:
+            row = int(np.argmax(found))
+            raise InputError(
+                f"{table.file}, column '{name}', {table.row_name(int(rows[row]))}: the value is "
+                f"{fault_of(values[row])}, {int(found.sum())} such in the column; correct them, or {REPAIR} "
+                "drops the rows"
+            )
+        bad = found if bad is None else bad | found
+    if bad is None:
+        return rows, None
+    first = int(rows[np.argmax(bad)])
+    count = int(bad.sum())
+    message = f"rows dropped for missing or infinite values: {count}, the first: {table.row_name(first)}"
+    return np.flatnonzero(~bad), Finding("repaired_rows", message, row=first + 1, count=count)
+
+
+def order_error(table: Rows, rows: IndexArray, time: FloatArray, ordered: Ordered) -> InputError:
+    """What to say of a clock out of order: what it suffers from, and only what mends that."""
+    at = int(np.argmax(time[1:] <= time[:-1])) + 1 if np.any(time[1:] <= time[:-1]) else 0
+    why = float32_reason(time) or ordered.hopeless
+    if why:
+        cure = f"{why}; correct it, or give 'sample_s' in an import profile in place of the clock"
+        return step_error(table, int(rows[at]), time[at] == time[at - 1], cure)
+    told = ", and ".join(fault.told for fault in ordered.faults)
+    cures = " and ".join(dict.fromkeys(fault.cure for fault in ordered.faults))
+    return step_error(
+        table, int(rows[at]), time[at] == time[at - 1], f"{told}; correct it, or {REPAIR} {cures}"
+    )
+
+
+def step_error(table: Rows, row: int, repeats: bool, cure: str = "correct it") -> InputError:
+    what = "repeats" if repeats else "goes back"
+    return InputError(
+        f"{table.file}, column 'time', {table.row_name(row)}: time {what}; it must strictly increase: {cure}"
+    )

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted, quoted
 from fogml.runs.assemble import MOST_DROPPED, runs_of_columns
 from fogml.runs.checks import check_run
@@ -23,16 +23,14 @@ from fogml.runs.logger_rows import (
     rows_of_leg,
 )
 from fogml.runs.logger_text import LoggerTable
+from fogml.runs.possible import Rows
 from fogml.runs.profile_parts import LeadingJump
 from fogml.runs.profile_schema import ImportProfile, load_profile, profile_names
-from fogml.runs.row_faults import Rows
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
 from fogml.signals import large
 
 __all__ = ["import_recording", "load_profile", "profile_names", "run_names", "runs_from_table"]
-
-FloatArray = NDArray[np.float64]
 
 
 def import_recording(
@@ -216,7 +214,7 @@ def _without_leading_rows(table: LoggerTable, rule: LeadingJump | None) -> Logge
 
 def _leg(
     table: LoggerTable, profile: ImportProfile, leg: str | None, file: str
-) -> tuple[NDArray[np.bool_] | slice, tuple[Finding, ...]]:
+) -> tuple[BoolArray | slice, tuple[Finding, ...]]:
     """The rows of a leg, and how many rows of the file belong to none."""
     if leg is None:
         return slice(None), ()
@@ -233,7 +231,7 @@ def _leg(
 
 def _columns(
     table: LoggerTable,
-    part: NDArray[np.bool_] | slice,
+    part: BoolArray | slice,
     profile: ImportProfile,
     axis: str | None,
     file: str,

@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, quoted
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.facts import NAMES, Facts, facts_from
@@ -202,7 +200,7 @@ class RawTable:
 
     file: str
     cells: tuple[str, ...]
-    columns: Mapping[str, NDArray[np.float64]]
+    columns: Mapping[str, FloatArray]
     facts: Facts | None = None
     row_name: Callable[[int], str] = numbered_row
     findings: tuple[Finding, ...] = field(default=())

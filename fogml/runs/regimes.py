@@ -9,8 +9,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray
 from fogml.runs.columns import coil_sensor_number
-from fogml.runs.run import BoolArray, Run
+from fogml.runs.run import Run
 from fogml.runs.temperature_motion import Motion, Move, find_motion
 from fogml.runs.turning import turning
 

@@ -11,8 +11,9 @@ from types import MappingProxyType
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.arrival_times import sampling_times
 from fogml.runs.columns import coil_sensor_number, is_temperature
@@ -23,9 +24,6 @@ from fogml.runs.findings import Finding, first_of_all
 from fogml.runs.possible import as_vector, check_columns
 from fogml.signals import large
 from fogml.signals.clock import Clock, gap_starts
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +279,7 @@ class Run(Exchange):
         return self.clock.sample_s
 
     @cached_property
-    def gap_starts(self) -> NDArray[np.intp]:
+    def gap_starts(self) -> IndexArray:
         """Indices of the samples that follow a gap longer than 3 median sample intervals."""
         return gap_starts(self.time, self.sample_s)
 

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 FINER = 0.75

@@ -9,14 +9,13 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 
 if TYPE_CHECKING:
     from pyarrow import Array
 
-FloatArray = NDArray[np.float64]
 
 _DATE = (
     r"(?P<a>\d{4}|\d{1,2})\s*[-/.年\s]\s*(?P<b>\d{1,2}|[A-Za-z]{3,9})\s*[-/.月\s]\s*"
@@ -66,7 +65,7 @@ class StampForm:
         """Whether a text is such a stamp."""
         return re.match(_FORMS[self.kind], text) is not None
 
-    def nanoseconds(self, texts: Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def nanoseconds(self, texts: Array) -> tuple[IntArray, BoolArray]:
         """Nanoseconds since 1970 (of a time of day: since midnight), and which texts are no such stamps.
 
         Parameters
@@ -93,7 +92,7 @@ class StampForm:
             total, wrong = total + seconds, wrong | bad
         return total, wrong
 
-    def _days(self, a: Any, b: Any, c: Any) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def _days(self, a: Any, b: Any, c: Any) -> tuple[IntArray, BoolArray]:
         by_order = {"ymd": (a, b, c), "dmy": (c, b, a), "mdy": (c, a, b)}
         year, month, day = by_order["dmy" if self.order == "?" else self.order]
         year = np.where(year < 100, year + 2000, year)
@@ -206,7 +205,7 @@ def stamps_of(columns: Sequence[tuple[int, Sequence[str]]]) -> Stamps | None:
     return Stamps(known, first, zoned and not all(form.kind == "date" for _, form in known))
 
 
-def _whole(texts: Any) -> NDArray[np.int64]:
+def _whole(texts: Any) -> IntArray:
     """Digits as whole numbers, 0 where there are none."""
     import pyarrow as arrow
     import pyarrow.compute as compute
@@ -215,7 +214,7 @@ def _whole(texts: Any) -> NDArray[np.int64]:
     return np.asarray(compute.fill_null(digits.cast(arrow.int64()), 0).to_numpy(zero_copy_only=False))
 
 
-def _month(texts: Any) -> NDArray[np.int64]:
+def _month(texts: Any) -> IntArray:
     """Months from their numbers or English names, 0 where there is none."""
     import pyarrow as arrow
     import pyarrow.compute as compute
@@ -227,7 +226,7 @@ def _month(texts: Any) -> NDArray[np.int64]:
     return np.asarray(compute.fill_null(places, -1).to_numpy(zero_copy_only=False), dtype=np.int64) + 1
 
 
-def _seconds(parts: dict[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _seconds(parts: dict[str, Any]) -> tuple[IntArray, BoolArray]:
     """Nanoseconds of times of day, their zone taken off, and which are none."""
     import pyarrow.compute as compute
 

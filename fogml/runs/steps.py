@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
+from fogml.intervals import MEDIAN_SIZE
 
 FINEST_STEP_DEGC = 5e-4
 """Steps of a record that are finer are its digits and no sensor's."""
@@ -53,7 +54,7 @@ def noisy_beyond(temperature: FloatArray, least: float) -> bool:
 
 
 def _noise_in_differences(values: FloatArray, order: int) -> float:
-    size = float(np.median(np.abs(np.diff(values, order)))) / 0.6745
+    size = float(np.median(np.abs(np.diff(values, order)))) / MEDIAN_SIZE
     return size / math.sqrt(math.comb(2 * order, order))
 
 
@@ -66,4 +67,4 @@ def reading_noise(temperature: FloatArray) -> float:
     steps = steps[steps > 1e-9]
     least = float(np.quantile(steps, 0.01)) if len(steps) else 0.0
     quantised = least / np.sqrt(12.0) if len(np.unique(temperature)) < len(temperature) / 2 else 0.0
-    return float(max(np.median(second) / 0.6745 / np.sqrt(6.0), quantised))
+    return float(max(np.median(second) / MEDIAN_SIZE / np.sqrt(6.0), quantised))

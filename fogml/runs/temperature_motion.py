@@ -14,12 +14,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.turning import white_noise
 from fogml.signals import large
 from fogml.signals.clock import gap_starts
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 SETTLED_DEGC_MIN = 0.05
 """A sensor slower than this is settled [degC/min]."""
@@ -107,7 +105,7 @@ class Motion:
     grid: Grid
     temperature: FloatArray
     moves: tuple[Move, ...]
-    moving: NDArray[np.bool_]
+    moving: BoolArray
 
 
 def find_motion(time: FloatArray, sample_s: float, temperatures: Sequence[FloatArray]) -> Motion:

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fogml.runs.run import FloatArray, Run
+from fogml.arrays import FloatArray
+from fogml.runs.run import Run
 from fogml.signals import large
 from fogml.signals.memory import Lag
 

@@ -6,15 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.runs.columns import is_temperature
 from fogml.runs.dropouts import RULE, DropoutRule
 from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -109,8 +107,8 @@ def trained_limits(
 class _Averaging:
     """Averages of rows: where each begins, how many rows it has, its mean time; time between rows [s]."""
 
-    starts: NDArray[np.intp]
-    counts: NDArray[np.intp]
+    starts: IndexArray
+    counts: IndexArray
     middle_s: FloatArray
     apart: FloatArray
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.turning import LEAST_RATE_DEG_S, white_noise
-
-IndexArray = NDArray[np.intp]
 
 MARGIN_BEYOND_S = 2.5
 """The margin is this much longer than the time to rate, which the source bounds by 5 s."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.arrays import BoolArray, FloatArray
+from fogml.intervals import MEDIAN_SIZE
+from fogml.runs.run import Run
 from fogml.signals import large
 
 LEAST_RATE_DEG_S = 1e-3
@@ -16,7 +18,7 @@ def white_noise(values: FloatArray) -> float:
     if len(values) < 4:
         return 0.0
     bends = large.median(lambda: (np.abs(part) for _, part in large.differences(values, 2)))
-    return bends / 0.6745 / float(np.sqrt(6.0))
+    return bends / MEDIAN_SIZE / float(np.sqrt(6.0))
 
 
 def turning(run: Run) -> BoolArray:

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.signals import large
 from fogml.signals.allan_confidence import degrees_of_freedom, noise_exponents, variance_interval
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Segments = Iterable[slice | tuple[int, int]]
 
 

@@ -9,10 +9,8 @@ identification using the lag 1 autocorrelation", 18th EFTF (2004).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from fogml.arrays import FloatArray, IntArray
 
 QUANTISATION, WHITE, FLICKER, RANDOM_WALK = 2, 0, -1, -2
 """Exponents of the rate's power spectral density: quantisation of the angle, white (angle

@@ -7,18 +7,15 @@ segment after segment. Segment ``s`` of k samples holds k + 1 phases at
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IntArray
+from fogml.processes import available_cores
 from fogml.signals import large
 from fogml.signals.compiled import kernel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _SUM_BLOCK = 1024
 _TILE = 65_536
@@ -121,19 +118,13 @@ def lag_sums(phases: FloatArray, edges: IntArray, factors: IntArray) -> FloatArr
 
 
 def _spread(work: Callable[[int], None], parts: int, *, threaded: bool) -> None:
-    threads = min(_cores(), parts)
+    threads = min(available_cores(), parts)
     if not threaded or threads < 2:
         for part in range(parts):
             work(part)
         return
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(work, range(parts)))
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _pieces(lengths: IntArray, size: int) -> tuple[IntArray, IntArray]:

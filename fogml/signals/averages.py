@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.signals import large
 from fogml.signals.clock import GAP_SHARE, Clock, gap_starts
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 AVERAGING_S = 100.0
 """Averaging time of figures unless another is asked for [s]: long beside white noise, short beside thermal

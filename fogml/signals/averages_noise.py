@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.signals.noise_spectrum import Spectrum
 from fogml.signals.spectrum_fit import SpectrumTerms, term_shapes
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class FastNoise:
         return float(each @ self.count), float(2.0 * each**2 @ self.count)
 
 
-def fast_noise(spectrum: Spectrum, rows: NDArray[np.bool_], from_hz: float, samples: int) -> FastNoise:
+def fast_noise(spectrum: Spectrum, rows: BoolArray, from_hz: float, samples: int) -> FastNoise:
     """The rows of a spectrum of so many samples that are noise too fast for a drift."""
     per_hz = 2.0 * samples * spectrum.sample_s
     return FastNoise(

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.signals.recursions import lag_kernel, play_kernel
-
-FloatArray = NDArray[np.float64]
 
 
 def bumps(x: FloatArray, low: float, high: float, count: int) -> FloatArray:
@@ -81,7 +79,7 @@ def decayed(time: FloatArray, kicks: FloatArray, time_constant_s: float) -> Floa
 
 def corners(time: FloatArray, x: FloatArray, within: float) -> list[int]:
     """Corners of a line that stays near a course (D. Douglas and T. Peucker, Cartographica 10 (1973) 112)."""
-    kept: NDArray[np.bool_] = np.zeros(len(x), dtype=np.bool_)
+    kept: BoolArray = np.zeros(len(x), dtype=np.bool_)
     kept[[0, -1]] = True
     todo = [(0, len(x) - 1)]
     while todo:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.signals.clock import FloatArray
+from fogml.arrays import FloatArray
 
 
 def centred_rate(time: FloatArray, x: FloatArray, window_s: float) -> FloatArray:

@@ -6,13 +6,12 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.signals import large
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 Number = TypeVar("Number", float, FloatArray)
 
 EDGE_TOLERANCE = 1e-6
@@ -91,7 +90,7 @@ class Clock:
         return interval
 
 
-def gap_starts(time: FloatArray, sample_s: float, longest_s: float = 0.0) -> NDArray[np.intp]:
+def gap_starts(time: FloatArray, sample_s: float, longest_s: float = 0.0) -> IndexArray:
     """Indices of the samples that follow a gap longer than `longest_s`.
 
     Parameters

@@ -6,18 +6,18 @@ For drawing only. No figure in a table or a JSON file ever comes from a reduced 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.signals import large
 
-FloatArray = NDArray[np.float64]
 DRAWN_POINTS = 4000
 """Points per trace above which a series is reduced."""
 LONGEST_STEP = 2.5
 """A step longer than this many median steps is drawn as a gap."""
 
 
-def gap_starts(time: ArrayLike, longest: float = LONGEST_STEP) -> NDArray[np.intp]:
+def gap_starts(time: ArrayLike, longest: float = LONGEST_STEP) -> IndexArray:
     """Indices of the samples that follow a gap, for times of shape (n,) in any unit."""
     steps = np.diff(np.asarray(time, dtype=np.float64))
     if steps.size == 0:
@@ -25,7 +25,7 @@ def gap_starts(time: ArrayLike, longest: float = LONGEST_STEP) -> NDArray[np.int
     return np.flatnonzero(steps > longest * np.median(steps)) + 1
 
 
-def min_max_indices(values: ArrayLike, points: int = DRAWN_POINTS) -> NDArray[np.intp]:
+def min_max_indices(values: ArrayLike, points: int = DRAWN_POINTS) -> IndexArray:
     """Indices of at most ``points`` samples that keep every bucket's least and greatest value.
 
     The first and the last sample stay as well, so a curve's ends do not move.
@@ -39,7 +39,7 @@ def min_max_indices(values: ArrayLike, points: int = DRAWN_POINTS) -> NDArray[np
 
     Returns
     -------
-    NDArray[np.intp]
+    IndexArray
         Increasing indices; all of them where n is at most ``points``.
     """
     values = np.asarray(values, dtype=np.float64)
@@ -72,7 +72,7 @@ def drawn(
     time: ArrayLike,
     values: ArrayLike,
     points: int = DRAWN_POINTS,
-    gaps: NDArray[np.intp] | None = None,
+    gaps: IndexArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """A time series as it is drawn: min-max reduced, with a NaN in every gap.
 

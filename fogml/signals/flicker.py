@@ -15,11 +15,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.signals.compiled import kernel
-
-FloatArray = NDArray[np.float64]
 
 LONGEST_S = 1e7
 """Time constant of the slowest lag [s]: the spectrum is flat below its corner."""

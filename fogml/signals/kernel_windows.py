@@ -14,8 +14,8 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.signals.clock import (
     EDGE_TOLERANCE,
@@ -30,8 +30,6 @@ from fogml.signals.clock import (
 )
 from fogml.signals.windows import Windowed
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 _CHUNK = 1 << 22
 _LEAST_MOMENT = 1e-6
 _MANY, _LEAST_ROWS = 8, 4096
@@ -124,8 +122,8 @@ def _rate_by_knots(
     kernel: Kernel,
     time: FloatArray,
     x: FloatArray,
-    rows: NDArray[np.intp],
-    oldest: NDArray[np.intp],
+    rows: IndexArray,
+    oldest: IndexArray,
     window_s: float,
 ) -> FloatArray:
     """Rates [per s] at rows whose windows begin at `oldest`, from running sums between the weights' knots.

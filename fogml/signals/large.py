@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
-
-FloatArray = NDArray[np.float64]
 
 HELD_VALUES = 1 << 20
 """Values up to which an array is kept in memory: 8 MiB of float64, of which a command holds some dozens."""
@@ -150,7 +149,7 @@ def each(function: Callable[..., ArrayLike], *arrays: NDArray[Any], kind: Any = 
     return made
 
 
-def count_up(samples: int) -> NDArray[np.intp]:
+def count_up(samples: int) -> IndexArray:
     """``numpy.arange`` of places."""
     if samples <= HELD_VALUES:
         return np.arange(samples, dtype=np.intp)
@@ -160,7 +159,7 @@ def count_up(samples: int) -> NDArray[np.intp]:
     return made
 
 
-def chosen(values: NDArray[Any], mask: NDArray[np.bool_] | slice) -> NDArray[Any]:
+def chosen(values: NDArray[Any], mask: BoolArray | slice) -> NDArray[Any]:
     """The values that a mask marks, or a part of them."""
     if len(values) <= HELD_VALUES or isinstance(mask, slice):
         return np.asarray(values[mask])
@@ -172,7 +171,7 @@ def chosen(values: NDArray[Any], mask: NDArray[np.bool_] | slice) -> NDArray[Any
     return made
 
 
-def places(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+def places(mask: BoolArray) -> IndexArray:
     """``numpy.flatnonzero`` of a mask."""
     if len(mask) <= HELD_VALUES:
         return np.flatnonzero(mask)

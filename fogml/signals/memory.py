@@ -10,13 +10,10 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.signals.clock import EXPONENTIAL_SPAN, check_window, gap_starts, longest_gap_s, needed_s
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 class MemoryOperator(Protocol):

@@ -13,12 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.signals.compiled import kernel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _CHUNK = 512
 _INVERSE_FACTORIALS = np.array([1.0 / math.factorial(k) for k in range(11)])

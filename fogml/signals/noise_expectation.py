@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals.noise_model import Ladder, NoiseModel
 from fogml.signals.whitening import Whitener
-
-FloatArray = NDArray[np.float64]
 
 _COLUMNS = 64
 

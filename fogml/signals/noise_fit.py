@@ -13,15 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals.noise_fit_data import FitData, Level, Part, fit_data
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.noise_terms import FLICKER_FLOOR
 from fogml.signals.whitening import Whitener
-
-FloatArray = NDArray[np.float64]
 
 NAMES = ("N", "B", "K")
 """The fitted coefficients, in the order of `NoiseFit.covariance`."""

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals.averages import block_averages
 from fogml.signals.clock import Clock
 from fogml.signals.noise_model import ADJOINING, NoiseModel, flicker_ladder
 from fogml.signals.whitening import Whitener
-
-FloatArray = NDArray[np.float64]
 
 _ANY = NoiseModel(1.0)
 _FEWEST = 16

@@ -10,12 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals.noise_terms import FLICKER_FLOOR
-
-FloatArray = NDArray[np.float64]
 
 WIDEST_STEP = 0.75 * math.log(10.0)
 """Widest step between the ladder's time constants, in the logarithm: ripple of 1.3 % about 1/f."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.signals.noise_spectrum import Spectrum
 from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, OutputFilter
 from fogml.signals.spectrum_fit import (
@@ -17,9 +17,6 @@ from fogml.signals.spectrum_fit import (
     excess_of,
     relative_errors,
 )
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 PLAIN = SpectrumTerms()
 BEHIND = SpectrumTerms(("N", "B", "K", "Q", "W"))

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.signals import large
 from fogml.signals.cosine import cosine_transform
 
-FloatArray = NDArray[np.float64]
 Rows = Callable[[slice], FloatArray]
 """Columns of a stretch, told for some of its rows at a time."""
 
@@ -237,14 +236,14 @@ def _edges(begin: float, per_octave: int) -> FloatArray:
 
 
 def _lines(
-    square: FloatArray, edges: NDArray[np.int64], sample_s: float, n: int, offset: int, chance: float
-) -> tuple[NDArray[np.bool_] | None, list[SpectralLine]]:
+    square: FloatArray, edges: IntArray, sample_s: float, n: int, offset: int, chance: float
+) -> tuple[BoolArray | None, list[SpectralLine]]:
     """Coefficients of sinusoids that stand out of their bins' noise, and what they are."""
     from scipy.stats import chi2
 
     # Median and limit of a squared normal value.
     typical, limit = float(chi2.ppf(0.5, 1)), float(chi2.isf(chance, 1))
-    masked: NDArray[np.bool_] | None = None
+    masked: BoolArray | None = None
     lines: list[SpectralLine] = []
     for low, high in pairwise(edges.tolist()):
         # A median of few, or of one side of a line, says nothing.

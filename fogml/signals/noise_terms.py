@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals.allan import AllanResult, allan_deviation
 from fogml.signals.noise_search import NoiseSearch, search_noise
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 from fogml.signals.spectrum_fit import AFTER, SpectrumFit, term_shapes
 
-FloatArray = NDArray[np.float64]
 TermName = Literal["Q", "N", "B", "K", "R"]
 
 TERM_NAMES: tuple[TermName, ...] = ("Q", "N", "B", "K", "R")

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from fogml.arrays import FloatArray
 
 # How a digital or an analogue filter sees a frequency, in cycles per sample.
 _WARPS: dict[str, Callable[[FloatArray], FloatArray]] = {

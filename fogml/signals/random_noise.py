@@ -13,11 +13,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.signals.compiled import kernel
 from fogml.signals.modes import phi_functions
 from fogml.signals.waves import sine
 
-FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 
 # Steps of a random walk's means over neighbouring samples have variance 2/3 and covariance 1/6.

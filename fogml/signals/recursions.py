@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.signals.compiled import kernel
 
-FloatArray = NDArray[np.float64]
 _ROUNDED = 2.0 * float(np.finfo(np.float64).eps)
 """What rounding may make of a difference of two times, of the time."""
 

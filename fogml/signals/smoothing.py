@@ -12,11 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
-FloatArray = NDArray[np.float64]
+from fogml.arrays import FloatArray
 
 PENALTIES = np.geomspace(1e-3, 1e8, 23)
 LEAST_PASSED = 0.1

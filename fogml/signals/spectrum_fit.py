@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.signals.noise_spectrum import Spectrum
 from fogml.signals.output_filters import NO_FILTER, OutputFilter
-
-FloatArray = NDArray[np.float64]
 
 AFTER = ("Q", "W", "E")
 """Terms that a filter does not act on."""
@@ -67,7 +65,7 @@ class SpectrumFit:
     loss: float
     constants: FloatArray
     covariance: FloatArray
-    used: NDArray[np.bool_]
+    used: BoolArray
 
     def __getitem__(self, name: str) -> float:
         """The coefficient of a term, 0 if the model has none."""
@@ -100,7 +98,7 @@ class SpectrumModel:
         spectrum: Spectrum,
         terms: SpectrumTerms,
         output_filter: OutputFilter = NO_FILTER,
-        used: NDArray[np.bool_] | None = None,
+        used: BoolArray | None = None,
     ) -> None:
         self.spectrum, self.terms, self.filter = spectrum, terms, output_filter
         self.used = np.ones(len(spectrum.power), dtype=np.bool_) if used is None else used
@@ -307,7 +305,7 @@ def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: SpectrumTerms)
     return np.stack(columns, axis=-1)
 
 
-def relative_errors(model: SpectrumModel, fit: SpectrumFit) -> tuple[FloatArray, NDArray[np.intp]]:
+def relative_errors(model: SpectrumModel, fit: SpectrumFit) -> tuple[FloatArray, IndexArray]:
     """Normal errors of the rows of many coefficients, and which: cube roots (Wilson and Hilferty, 1931)."""
     rows = np.flatnonzero((model.spectrum.count >= 8.0) & fit.used)
     scale = 2.0 / (9.0 * model.freedom[rows])

@@ -14,11 +14,9 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.signals.clock import Clock, gap_starts
-
-FloatArray = NDArray[np.float64]
 
 CELL_S = 10.0
 """Readings are averaged over this time first; a thermometer's place knows nothing quicker."""

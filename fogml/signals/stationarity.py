@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.signals import large
-
-FloatArray = NDArray[np.float64]
 
 PARTS, BLOCKS = 3, 8
 """Parts of the series that are compared, and blocks of each whose scatter says what chance does."""

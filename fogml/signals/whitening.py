@@ -12,15 +12,13 @@ from collections.abc import Iterable, Iterator
 from copy import copy
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.signals.clock import Clock
 from fogml.signals.noise_model import ADJOINING, Ladder, NoiseModel
 from fogml.signals.whitening_kernels import adjoint_kernel, gains_kernel, whiten_kernel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _ROUNDING = 1e-6
 """Steps are told apart to this share of the averaging time."""

@@ -11,13 +11,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.signals.compiled import kernel
 from fogml.signals.modes import phi_functions
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _TILE = 128
 

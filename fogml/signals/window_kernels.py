@@ -13,7 +13,8 @@ import math
 
 from numba import boolean, float64, types
 
-from fogml.signals.clock import BoolArray, FloatArray, told_share
+from fogml.arrays import BoolArray, FloatArray
+from fogml.signals.clock import told_share
 from fogml.signals.compiled import kernel
 
 # Declared read-only, the inputs take both the frozen columns of a run and ordinary arrays.

@@ -28,15 +28,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.signals.clock import (
     EDGE_TOLERANCE,
     EXPONENTIAL_SPAN,
     GAP_INTERVALS,
     LEAST_SHARE,
-    BoolArray,
     Clock,
-    FloatArray,
     check_window,
     counting_s,
     longest_gap_s,

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.effect import (
     Effect,
     LoggerEffect,

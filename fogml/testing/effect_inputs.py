@@ -6,10 +6,9 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.twin.effect import SET_UP
 from fogml.twin.inputs import REST, STAND_INS, Inputs
 from fogml.twin.memory import Memory
@@ -113,7 +112,7 @@ def block(inputs: Inputs, start: int, stop: int, memory: Memory | None = None) -
     return rows(inputs, slice(start, stop), memory)
 
 
-def rows(inputs: Inputs, which: slice | NDArray[np.int64], memory: Memory | None = None) -> Inputs:
+def rows(inputs: Inputs, which: slice | IntArray, memory: Memory | None = None) -> Inputs:
     """Some rows of inputs."""
     return replace(
         inputs,

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.signal import NOT_INPUTS, TIME_ON
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 
-FloatArray = NDArray[np.float64]
 AGREEMENT = 1e-9
 """Greatest difference between two ways to the same value, relative to the column's size."""
 

@@ -12,12 +12,13 @@ from itertools import pairwise
 import numpy as np
 from sklearn.base import clone
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.base import GOOD, NOT_FULL, OUTSIDE, DriftModel
 from fogml.models.compensation import compensate_blocks
 from fogml.models.saved import load_model, model_to_saved, save_model
 from fogml.runs.facts import Facts, ScaleFactor
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 
 AGREEMENT = 1e-9
 """Greatest difference between two ways to the same value, relative to the values' size."""

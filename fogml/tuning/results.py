@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from fogml.json_files import finite_json
 from fogml.tuning.plan import OBJECTIVES
-from fogml.tuning.sampling import place_of
 from fogml.tuning.storage import shown
-from fogml.tuning.study import is_finished
+from fogml.tuning.study import is_finished, place_of
 from fogml.tuning.winner import against_references, command_line, figure, importance, pareto, winner
 from fogml.validation.report_json import judgement_json
 

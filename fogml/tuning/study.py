@@ -1,4 +1,4 @@
-"""Studies: opening or joining one, counting its trials, and trying again what a dead worker left."""
+"""Studies: opening or joining one, sampling, checking and counting its trials, trying again what was left."""
 
 from __future__ import annotations
 
@@ -9,19 +9,159 @@ import time
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+from zlib import crc32
+
+import numpy as np
+import optuna
+from optuna.distributions import BaseDistribution
+from optuna.samplers import BaseSampler, RandomSampler, TPESampler
+from optuna.trial import FrozenTrial
+from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
 
 from fogml.errors import InputError
 from fogml.processes import process_is_alive, process_start
 from fogml.runs.run import Run
 from fogml.strict_json import parse_json
 from fogml.tuning.plan import Plan
-from fogml.tuning.sampling import PLACE, place_of
 from fogml.tuning.storage import import_optuna, open_storage, shown
-from fogml.tuning.trial_check import check_trials
 
 if TYPE_CHECKING:
     import optuna
     from optuna.trial import FrozenTrial
+
+PLACE = "place"
+"""Attribute of a trial: which of the trials asked for it is, from 0; a trial tried again keeps it."""
+
+
+class SeededByTrial(BaseSampler):
+    """A sampler whose random numbers follow from the seed and the trial's place alone.
+
+    What a trial draws follows from the seed, the trial's place and, with ``tpe``, the trials that have
+    finished. So one worker, killed anywhere and started again on its machine, goes on as it would have
+    gone, bit for bit. Several workers try the same with ``random``; with ``tpe`` what they try depends on
+    the order in which they finish.
+
+    Parameters
+    ----------
+    name
+        ``tpe`` (tree-structured Parzen estimator) or ``random``.
+    seed
+        The sweep's seed.
+    """
+
+    def __init__(self, name: str, seed: int) -> None:
+        self._name, self._seed = name, seed
+
+    def infer_relative_search_space(
+        self, study: optuna.Study, trial: FrozenTrial
+    ) -> dict[str, BaseDistribution]:
+        """Nothing: which parameters there are depends on what is chosen first."""
+        return {}
+
+    def sample_relative(
+        self, study: optuna.Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
+    ) -> dict[str, Any]:
+        """Nothing: each parameter is drawn by itself."""
+        return {}
+
+    def sample_independent(
+        self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
+    ) -> Any:
+        """A parameter's value; it follows from seed, place and name, whatever was drawn before."""
+        key = [self._seed, place_of(trial), crc32(param_name.encode())]
+        seed = int(np.random.SeedSequence(key).generate_state(1)[0])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            kind: Any = TPESampler if self._name == "tpe" else RandomSampler
+            return kind(seed=seed).sample_independent(study, trial, param_name, param_distribution)
+
+
+def place_of(trial: FrozenTrial | optuna.Trial) -> int:
+    """Which of the trials asked for one is."""
+    return int(trial.user_attrs.get(PLACE, trial.number))
+
+
+class _Worker(BaseModel):
+    model_config = ConfigDict(strict=True)
+    host: str
+    pid: int = 0
+    started: str
+
+
+class _Attributes(BaseModel):
+    """What is told of a trial, where it is told."""
+
+    model_config = ConfigDict(strict=True, protected_namespaces=())
+    model: str = ""
+    features: str | None = None
+    parameters: dict[str, Any] = {}
+    fold_errors: list[list[FiniteFloat]] = []
+    fold_rows: list[list[FiniteFloat]] = []
+    fold_means: list[list[FiniteFloat]] | None = None
+    bytes: FiniteFloat | None = None
+    operations: FiniteFloat | None = None
+    reason: str = ""
+    place: int = 0
+    worker: _Worker | None = None
+    reference: str | None = None
+
+    @model_validator(mode="after")
+    def _of_one_length(self) -> _Attributes:
+        if [len(fold) for fold in self.fold_errors] != [len(fold) for fold in self.fold_rows]:
+            raise ValueError("each fold needs as many errors as numbers of rows")
+        lengths = [(len(errors), 0) for errors in self.fold_errors]
+        if self.fold_means is not None and (
+            len(self.fold_means) != len(lengths)
+            or any(len(means) not in kinds for means, kinds in zip(self.fold_means, lengths))
+        ):
+            raise ValueError("each fold needs as many means as errors, or none")
+        if any(rows <= 0.0 for fold in self.fold_rows for rows in fold):
+            raise ValueError("numbers of rows are positive")
+        return self
+
+
+class _Drawn(BaseModel):
+    """What was drawn and found."""
+
+    model_config = ConfigDict(strict=True)
+    params: dict[str, FiniteFloat | int | str | bool | None]
+    values: list[FiniteFloat] | None
+
+
+def check_trials(study: optuna.Study, plan: Plan) -> None:
+    """Check every trial that is there.
+
+    Raises
+    ------
+    InputError
+        Naming the first trial that is not as a sweep writes it.
+    """
+    for trial in study.get_trials(deepcopy=False):
+        fault = _fault(trial, len(plan.objectives))
+        if fault:
+            raise InputError(
+                f"study '{plan.name}' in {shown(plan.storage)}: trial {trial.number} is damaged ({fault}); "
+                "move the study away, or choose another --out or --name"
+            )
+
+
+def _fault(trial: FrozenTrial, objectives: int) -> str:
+    try:
+        told = _Attributes.model_validate(trial.user_attrs)
+        drawn = _Drawn.model_validate({"params": trial.params, "values": trial.values})
+    except ValidationError as error:
+        first = error.errors()[0]
+        return f"{'.'.join(str(part) for part in first['loc'][:2])}: {first['msg']}".lstrip(": ")
+    if trial.state.name != "COMPLETE":
+        return ""
+    if not told.model_fields_set >= {"model", "parameters"} or told.features is None:
+        return "it names no model, features and parameters"
+    if len(drawn.values or ()) != objectives:
+        return f"{objectives} values were expected"
+    if not (told.fold_errors and all(told.fold_errors)) or told.bytes is None or told.operations is None:
+        return "it holds no figures"
+    return ""
+
 
 IDENTITY, WORKER, BEAT = "fogml_identity", "worker", "beat"
 _SILENT_BEATS = 3
@@ -46,8 +186,6 @@ def open_study(plan: Plan, runs: Sequence[Run] | None = None) -> optuna.Study:
         If the storage does not answer, or holds a study of this name made for something else.
     """
     found = import_optuna()
-    from fogml.tuning.sampling import SeededByTrial
-
     study = found.create_study(
         storage=open_storage(plan.storage, plan.folder),
         sampler=SeededByTrial(plan.sampler, plan.seed),

@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.tuning.references import DEFAULT
-from fogml.tuning.sampling import place_of
+from fogml.tuning.study import place_of
 from fogml.tuning.worker import score_of
 
 if TYPE_CHECKING:

@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import FogmlError
-from fogml.models.candidates import Candidate
-from fogml.models.score import Score
-from fogml.runs.run import FloatArray
+from fogml.models.candidates import Candidate, Score
 from fogml.tuning.held_out import FoldResult, HeldOut
 from fogml.tuning.plan import Plan
-from fogml.tuning.sampling import place_of
 from fogml.tuning.space import Choice
-from fogml.tuning.study import BEAT, Recovery, begin_trial, finished_count, free_place
+from fogml.tuning.study import BEAT, Recovery, begin_trial, finished_count, free_place, place_of
 
 if TYPE_CHECKING:
     import optuna

@@ -19,8 +19,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.runs.facts import EARTH_RATE_DEG_H, Direction, Facts, Heading
-from fogml.runs.run import FloatArray
 
 _NAMED: dict[str, tuple[float, float]] = {
     "north": (0.0, 0.0),

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.twin.inputs import REST
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.plant.network import PlantState, ThermalNetwork

@@ -21,10 +21,10 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError, known_are
-from fogml.runs.run import FloatArray
 from fogml.twin.optics import DEG_H, REFERENCE_COIL, WINDINGS, Coil, Winding
 from fogml.twin.plant.network import PlantState, ThermalNetwork
 
@@ -69,7 +69,7 @@ def lead_sensitivity(coil: Coil = REFERENCE_COIL) -> float:
     return 0.5 * midpoint_sensitivity(coil)
 
 
-def winding_order(winding: Winding, layers: int = 32) -> NDArray[np.int64]:
+def winding_order(winding: Winding, layers: int = 32) -> IntArray:
     """Layers in the order in which the fibre passes them, 0 the innermost, shape (layers,).
 
     A cylinder is wound from one end to the other. The others are wound from the fibre's middle

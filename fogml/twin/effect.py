@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, known_are
-from fogml.runs.run import FloatArray
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Grade, Quantity
 

@@ -8,11 +8,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.signals.sample_means import mean_cosine, with_whole_turns
 from fogml.twin.attitude import Attitude, attitude, earth_rate, turned
 from fogml.twin.memory import Memory
@@ -289,7 +288,7 @@ class Inputs:
         return np.asarray(np.array(cold)[self.power_cycle] * np.exp(-self.time_on_s / time_constant))
 
     @cached_property
-    def power_cycle(self) -> NDArray[np.int64]:
+    def power_cycle(self) -> IntArray:
         """How many power-ons came after the first one, shape (n,)."""
         return np.searchsorted(np.array(self.power_ons_s), self.time, side="right")
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 import zlib
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
 
 URAD_S_IN_DEG_H = math.degrees(1e-6) * 3600.0
@@ -31,6 +32,11 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("R", "deg/h/h", (1e-3, 0.1), (1e-5, 1e-3), "rate ramp", (-_TOP, _TOP)),
 )
 """Coefficients of the noise terms, with the ranges of the grades."""
+
+
+def amplitude_of(term: str, **more: Any) -> Quantity:
+    """The amplitude of the effect that a noise term is in the catalogue."""
+    return replace(next(q for q in QUANTITIES if q.name == term), name="amplitude", meaning=term, **more)
 
 
 @dataclass(frozen=True)

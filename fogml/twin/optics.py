@@ -16,8 +16,8 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 
 _Power = TypeVar("_Power", float, FloatArray)
 LIGHT_M_S = 299_792_458.0

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import BoolArray, FloatArray
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.noise import TERM_EFFECTS, NoiseConstants, NoiseSource, stream
@@ -50,7 +49,7 @@ class RandomErrors:
             self._sum = drawn.copy() if self._sum is None else np.add(self._sum, drawn, self._sum)
 
     def block(
-        self, count: int, on: slice | NDArray[np.bool_], inputs: Inputs
+        self, count: int, on: slice | BoolArray, inputs: Inputs
     ) -> tuple[FloatArray, dict[str, FloatArray]]:
         """The noise over the next block [deg/h], and each random effect's part of it.
 

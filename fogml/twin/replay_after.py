@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.between_runs import (
     Storage,
     later_s,

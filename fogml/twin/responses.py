@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.signals.waves import sine
 from fogml.twin.attitude import earth_rate, turned
 from fogml.twin.inputs import Inputs

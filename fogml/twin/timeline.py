@@ -9,17 +9,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.programme import Programme
 from fogml.twin.schedule import Schedule, Track
 from fogml.twin.steps import Switched
 from fogml.twin.table import Wave
-
-IndexArray = NDArray[np.intp]
 
 ROOM_DEGC = 25.0
 """The room about the chamber: at this temperature it needs neither heater nor compressor."""

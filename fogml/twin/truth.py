@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.runs.columns import header, parse_header
 from fogml.runs.parquet_files import parquet_blocks
-from fogml.runs.run import FloatArray
 
 _PART = "contribution of "
 _DRIVE_UNITS = {"heading": "deg", "shaking": "1", "dose": "Gy"}

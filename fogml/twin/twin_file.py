@@ -33,7 +33,7 @@ from fogml.twin.set_up import (
     Sensors,
     Surroundings,
 )
-from fogml.twin.twin import EffectSetting, Twin
+from fogml.twin.twin import EffectSetting, Suspected, Twin, Uncertainty
 from fogml.twin.twin_schema import (
     AIRFLOW,
     COIL,
@@ -45,7 +45,6 @@ from fogml.twin.twin_schema import (
     Stated,
     message,
 )
-from fogml.twin.uncertainty import Suspected, Uncertainty
 from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.twin/1"

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from fogml.models.directions import LEAST_SPAN_DEGC, ways_moved
-from fogml.runs.run import FloatArray
-from fogml.validation.reach import LEVEL, floor_interval
+from fogml.arrays import FloatArray
+from fogml.models.box import LEAST_SPAN_DEGC, ways_moved
+from fogml.validation.floors import LEVEL, floor_interval
 from fogml.validation.results import Judgement, RunJudgement
 
 Grade = Literal["use", "use_with_care", "do_not_use"]

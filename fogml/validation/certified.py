@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.validation.results import RunJudgement
 
 _COVERAGE = 0.9

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import FogmlError, InputError
 from fogml.models.table import usable_rows
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S, block_averages
-from fogml.validation.floors import floor_of_run
-from fogml.validation.reach import out_of_reach
+from fogml.validation.floors import floor_of_run, out_of_reach
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel

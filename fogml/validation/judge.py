@@ -7,22 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.base import NOT_FULL, OUTSIDE
 from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.signals.averages import AVERAGING_S
-from fogml.validation.floors import check_noise_run, floor_of_run
+from fogml.validation.floors import check_noise_run, floor_of_run, out_of_reach
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
-from fogml.validation.metrics import RunMetrics
-from fogml.validation.reach import out_of_reach
-from fogml.validation.repeatability import repeatability_of
+from fogml.validation.metrics import RunMetrics, check_turn_on_band, repeatability_of
 from fogml.validation.results import AveragedSeries, Judgement, RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors, training_means
-from fogml.validation.turn_on import check_turn_on_band
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel

@@ -1,13 +1,14 @@
-"""Limits on the figures after compensation, and whether they are met."""
+"""Limits on the figures after compensation, and whether they are met; warnings as errors."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from fogml.errors import InputError, known_are
-from fogml.validation.repeatability import LEAST_RUNS, repeatability_of
+from fogml.runs.findings import Finding
+from fogml.validation.metrics import LEAST_RUNS, repeatability_of
 from fogml.validation.results import LimitOutcome, Metrics, RunJudgement
 
 _OVER_RUNS = {"bias_repeatability": "bias", "scale_factor_repeatability": "scale_factor"}
@@ -61,3 +62,26 @@ def outcome_of(quantity: str, limit: float, test: Sequence[RunJudgement]) -> Lim
         )
     value = max(told)
     return LimitOutcome(quantity=quantity, limit=limit, value=value, met=bool(value <= limit))
+
+
+STRICT_CODES = ("small_temperature_span", "outside_training", "seen_in_training")
+"""Codes of the findings that strictness makes errors."""
+
+
+def hold_strict(findings: Iterable[tuple[str, Sequence[Finding]]]) -> None:
+    """Raise for the first finding that strictness does not allow.
+
+    Parameters
+    ----------
+    findings
+        Name of each run with its findings.
+
+    Raises
+    ------
+    InputError
+        Naming the run and what was found.
+    """
+    for name, found in findings:
+        for finding in found:
+            if finding.code in STRICT_CODES:
+                raise InputError(f"{name}: {finding.message} (an error because --strict is set)")

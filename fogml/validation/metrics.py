@@ -1,20 +1,90 @@
-"""The figures of a run's error: bias, bias stability, range, rms, and what soaks and turns tell."""
+"""The figures of a run's error: bias, bias stability, range, rms, what soaks and turns tell, repeatability.
+
+Bias repeatability is the standard deviation of the bias over power cycles, at least 6; scale
+factor repeatability is ``std(K) / mean(K)``. Runs that state their power-on are power cycles; where fewer
+than 6 do, every run counts, and whether the unit was switched off between them is not known.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 from fogml.signals.averages import BlockAverages, block_averages
 from fogml.validation.rate_ladder import find_ladder, ladder_figures
-from fogml.validation.results import Metrics, SoakBias
+from fogml.validation.results import BeforeAfter, Metrics, Repeatability, RunJudgement, SoakBias
 from fogml.validation.scale_factor import LEAST_SHARE, find_steps, scale_factor_error
 from fogml.validation.soaks import find_soaks, hysteresis, temperature_sensitivity
-from fogml.validation.turn_on import check_turn_on_band, turn_on_time
+
+SETTLED_SHARE = 0.25
+"""The last quarter of a run's averages tells the settled bias."""
+LEAST_AVERAGES = 8
+
+
+def check_turn_on_band(band: float | None, runs: Iterable[Run] | None = None) -> None:
+    """Raise `InputError` for a band that is no positive number of deg/h, or that no run of `runs` answers."""
+    if band is not None and not (math.isfinite(band) and band > 0.0):
+        raise InputError(f"turn-on band {band:g} deg/h: a positive number is needed")
+    if band is not None and runs is not None and all(run.facts.powered_on is None for run in runs):
+        raise InputError(
+            f"turn-on band {band:g} deg/h: no run states when the gyro was switched on; write "
+            "'powered_on: SECONDS' into a side file, on the run's own clock, or leave the band out"
+        )
+
+
+def turn_on_time(
+    time_s: FloatArray, averages: FloatArray, powered_on_s: float, band_deg_h: float, averaging_s: float
+) -> float | None:
+    """Time from power-on until the averages stay within the band about their settled value [s].
+
+    The settled value is the mean of the last quarter of the averages. Where the band is entered
+    lies between two averages, and is interpolated.
+
+    Parameters
+    ----------
+    time_s
+        Mean time of each average [s], shape (m,).
+    averages
+        Averages of the error [deg/h], shape (m,).
+    powered_on_s
+        Time of power-on on the same clock [s].
+    band_deg_h
+        Greatest distance from the settled value [deg/h].
+    averaging_s
+        Averaging time [s].
+
+    Returns
+    -------
+    float or None
+        Infinite where the last quarter itself leaves the band, so the run does not settle. None
+        where the averages don't tell: fewer than 8 after power-on, or none of them outside the
+        band though the first is not right after power-on.
+    """
+    on = time_s >= powered_on_s
+    time, values = time_s[on], averages[on]
+    if len(values) < LEAST_AVERAGES:
+        return None
+    first_settled = len(values) - int(SETTLED_SHARE * len(values))
+    away = values - values[first_settled:].mean()
+    outside = np.flatnonzero(np.abs(away) > band_deg_h)
+    if len(outside) == 0:
+        # Settled before the first average ended; which says little where that came late.
+        at_once = float(time[0]) - powered_on_s
+        return at_once if at_once <= averaging_s else None
+    last = int(outside[-1])
+    if last >= first_settled - 1:
+        return math.inf
+    edge = math.copysign(band_deg_h, away[last])
+    share = (away[last] - edge) / (away[last] - away[last + 1])
+    return float(time[last] + share * (time[last + 1] - time[last]) - powered_on_s)
+
 
 SHORT_AVERAGING_S = 10.0
 
@@ -186,3 +256,33 @@ class RunMetrics:
             return None
         averages = self.averages(error, window_s=SHORT_AVERAGING_S).values[0]
         return figures_of_averages(averages).bias_stability if len(averages) > 1 else None
+
+
+LEAST_RUNS = 6
+
+
+def repeatability_of(test: Sequence[RunJudgement]) -> Repeatability | None:
+    """Repeatability over test runs; None for fewer than 6, or for several units or axes.
+
+    That of the scale factor is over those of them that hold turns, where 6 do.
+    """
+    cycles = [run for run in test if run.power_on_known]
+    over = cycles if len(cycles) >= LEAST_RUNS else test
+    if len(over) < LEAST_RUNS or len({(run.unit, run.axis) for run in over}) > 1:
+        return None
+    bias = BeforeAfter(*(_spread([getattr(run, when).bias for run in over]) for when in ("before", "after")))
+    turned = [run for run in over if run.after.scale_factor_error is not None]
+    scale = None
+    if len(turned) >= LEAST_RUNS:
+        errors = ([getattr(run, when).scale_factor_error for run in turned] for when in ("before", "after"))
+        scale = BeforeAfter(*map(_relative_spread, errors))
+    return Repeatability(len(over), over is cycles, bias, scale)
+
+
+def _spread(values: Sequence[float]) -> float:
+    return float(np.std(values, ddof=1))
+
+
+def _relative_spread(errors_ppm: Sequence[float]) -> float:
+    """``std(K) / mean(K)`` [ppm] of scale factors given as errors ``K - 1`` [ppm]."""
+    return _spread(errors_ppm) / (1.0 + float(np.mean(errors_ppm)) / 1e6)

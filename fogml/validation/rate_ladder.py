@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray, IndexArray
 from fogml.validation.scale_factor import Steps
 
 SAME_SHARE = 1e-3
@@ -37,7 +36,7 @@ class RateLadder:
     """
 
     rates: FloatArray
-    sides: NDArray[np.intp]
+    sides: IndexArray
     rest: int | None
 
 
@@ -117,7 +116,7 @@ def _asymmetry(ladder: RateLadder, output: FloatArray) -> float | None:
     return abs(slopes[1] - slopes[0]) / (0.5 * abs(slopes[0] + slopes[1])) * 1e6
 
 
-def _incidence(sides: NDArray[np.intp], levels: int) -> FloatArray:
+def _incidence(sides: IndexArray, levels: int) -> FloatArray:
     """One row per step, -1 at the level it leaves and 1 at the one it reaches, shape (k, l)."""
     matrix = np.zeros((len(sides), levels))
     rows = np.arange(len(sides))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fogml.json_files import finite_json
 from fogml.validation.advice import advice_on, coverage
 from fogml.validation.certified import set_up, with_uncertainty
-from fogml.validation.reach import left_is_noise
+from fogml.validation.floors import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, Metrics, Repeatability, RunJudgement
 
 if TYPE_CHECKING:

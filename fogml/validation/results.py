@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.pictures import AFTER, BEFORE, Panel, Pictured, in_time
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

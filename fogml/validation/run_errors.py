@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.models.table import usable_rows
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel

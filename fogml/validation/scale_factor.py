@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.runs.run import Run
 from fogml.runs.transitions import find_transitions, transition_mask
 from fogml.runs.turning import least_rate_deg_s
 
@@ -40,11 +40,11 @@ class Steps:
         Rates below this are rest [deg/h].
     """
 
-    before: NDArray[np.intp]
-    after: NDArray[np.intp]
+    before: IndexArray
+    after: IndexArray
     levels: FloatArray
-    turn: NDArray[np.intp]
-    usable: NDArray[np.intp]
+    turn: IndexArray
+    usable: IndexArray
     rest: float = 0.0
 
     def __len__(self) -> int:
@@ -69,7 +69,7 @@ class Steps:
         values = error_deg_h[self.usable]
         sums = np.concatenate(([0.0], np.cumsum(values - values.mean())))
 
-        def mean(rows: NDArray[np.intp]) -> FloatArray:
+        def mean(rows: IndexArray) -> FloatArray:
             return np.asarray((sums[rows[:, 1]] - sums[rows[:, 0]]) / (rows[:, 1] - rows[:, 0]))
 
         return mean(self.after) - mean(self.before)

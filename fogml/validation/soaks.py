@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, IndexArray
 from fogml.runs.regimes import regimes
-from fogml.runs.run import BoolArray, Run
+from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 
 ROOM_TEMPERATURE_DEGC = 25.0
@@ -41,7 +41,7 @@ class Soak:
         Whether a ramp up or down led to it; ``none`` at the start of a run.
     """
 
-    rows: NDArray[np.intp]
+    rows: IndexArray
     temperature: float
     approach: Approach
 
@@ -59,7 +59,7 @@ def find_soaks(run: Run, used: BoolArray, least_s: float) -> tuple[Soak, ...]:
     temperature = leading_temperature(run)
     if temperature is None:
         return ()
-    stays: list[tuple[Approach, list[NDArray[np.intp]]]] = [("none", [])]
+    stays: list[tuple[Approach, list[IndexArray]]] = [("none", [])]
     for name, start, stop in regimes(run).segments():
         if name in ("ramp_up", "ramp_down"):
             stays.append(("up" if name == "ramp_up" else "down", []))

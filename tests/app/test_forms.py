@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from fogml.cli.app_forms import INPUTS, forms, words_of
+from fogml.cli.app_job import INPUTS, forms, words_of
 from fogml.cli.main import app
 from fogml.errors import InputError
 

@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from fogml.benchmark.answers import answer_by, read_drift, write_drift
-from fogml.benchmark.design import RoundDesign
-from fogml.benchmark.drift_cases import DriftCase
-from fogml.benchmark.drift_score import geometric_mean
-from fogml.benchmark.entries import entry_name
-from fogml.benchmark.make import make_round, write_round
-from fogml.benchmark.rounds import TrackFolder
-from fogml.benchmark.score import score_round
+from fogml.benchmark.answers import answer_by, entry_name, read_drift, write_drift
+from fogml.benchmark.make import DriftCase, make_round, write_round
+from fogml.benchmark.rounds import RoundDesign, TrackFolder
+from fogml.benchmark.score import geometric_mean, score_round
 from fogml.blind.folders import case_files
 from fogml.cli.main import app
 from fogml.errors import InputError

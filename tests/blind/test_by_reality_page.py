@@ -7,8 +7,7 @@ import json
 import yaml
 
 from experiments.gap_blind import __main__ as experiment
-from fogml.blind.plan import REALITIES, SAME_TWIN
-from fogml.blind.seeds import is_final
+from fogml.blind.plan import REALITIES, SAME_TWIN, is_final
 from tests.blind.test_by_reality import MARKS, marked
 from tests.blind.test_marks import answer
 

@@ -11,10 +11,10 @@ from click.testing import CliRunner
 
 from fogml.blind.folders import BlindFolder, check_sums
 from fogml.blind.methods import code_state
+from fogml.blind.plan import FINAL_FROM, uses
 from fogml.blind.scoring.marks_file import MARKS
-from fogml.blind.seeds import FINAL_FROM, uses
 from fogml.blind.truth import read_truth
-from fogml.cli.blind_reports import link_reports
+from fogml.cli.blind_job import link_reports
 from fogml.cli.main import app
 from tests.blind.suites import SAMPLE_S, HandMade, make_suite
 from tests.blind.test_parts import WHOLE, marks_of, written

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import toeplitz
 
-from fogml.blind.case import recorded_run
 from fogml.blind.first.effects.coil import SlipEvents
 from fogml.blind.first.noise import record_length
 from fogml.blind.first.reality import INVENTED, KNOWN, REALITY, WRONG_STRUCTURE, draw_unit
@@ -22,6 +21,7 @@ from fogml.blind.frame.form import Form, compatible
 from fogml.blind.frame.reckoning import Reckoning
 from fogml.blind.frame.strength import Acting, Scales, TooWeak, acting_before, recorded
 from fogml.blind.frame.unit import Unit
+from fogml.blind.make import recorded_run
 from fogml.blind.plan import Plan
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.nominal import NominalConstants

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from fogml.blind.scoring.answers import Answer, Gap
-from fogml.blind.scoring.breakdowns import confusion, left_out, worst
 from fogml.blind.scoring.marks import Mark, mark
 from fogml.blind.scoring.table import rows
+from fogml.blind.scoring.values import confusion, left_out, worst
 from fogml.blind.truth import Amount, Kind, Runs, Segment, TrueClosed, TrueEffect, Truth
 
 RUNS = Runs(fit=("fit-1.csv",), held_out=("held-out-1.csv",))

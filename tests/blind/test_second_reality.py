@@ -25,8 +25,7 @@ from fogml.blind.second.memory import (
     slab_lag,
 )
 from fogml.blind.second.plant import Plant, draw_plant
-from fogml.blind.second.reality import draw_noise
-from fogml.blind.second.world import air_of, draw_chamber
+from fogml.blind.second.reality import air_of, draw_chamber, draw_noise
 
 RNG_SEED = 4
 LOOP = (np.linspace(-40.0, 60.0, 60), np.full(60, 7.0), np.linspace(0.5, 1.5, 60))

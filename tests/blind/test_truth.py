@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fogml.blind.folders import SUMS, check_sums, write_sums
-from fogml.blind.seeds import FINAL_FROM, check_use, record_use, uses
+from fogml.blind.plan import FINAL_FROM, check_use, record_use, uses
 from fogml.blind.truth import (
     Runs,
     TrueEffect,

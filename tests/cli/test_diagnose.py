@@ -251,7 +251,7 @@ def test_runs_of_different_units(runs, tmp_path, invoke, monkeypatch):
         cause = SharedCause("thermal_hysteresis", 0.97, sizes, mean, 0.07, (-0.2, 0.9), "deg/h")
         return UnitsDiagnosis({"FOG/1": own, "FOG-2": own}, (cause,))
 
-    monkeypatch.setattr("fogml.cli.diagnose_units.diagnose_units", together)
+    monkeypatch.setattr("fogml.cli.diagnose_job.diagnose_units", together)
     monkeypatch.setattr(
         "fogml.gap.result.Diagnosis.write_model", lambda self, model, path: path.write_text("")
     )

@@ -90,7 +90,7 @@ def test_installed_pages_are_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
 
 
 def test_every_option_stands_on_its_page(invoke) -> None:
-    from fogml.cli.options_page import options_page
+    from fogml.cli.docs_job import options_page
 
     text = options_page()
     sections = dict(re.findall(r"^## (fogml [^\n]+)\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL))

@@ -18,7 +18,7 @@ from click.testing import CliRunner
 
 import fogml
 from fogml.cli import each_axis, main
-from fogml.cli.options_page import commands_of
+from fogml.cli.docs_job import commands_of
 from fogml.cli.settings import given_settings
 from fogml.errors import InputError
 from fogml.export.noise_parameters import TARGETS

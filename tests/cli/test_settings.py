@@ -10,14 +10,11 @@ import yaml
 
 from fogml.cli import settings as settings_module
 from fogml.cli.command import spread_values
-from fogml.cli.compensate import CompensateSettings
-from fogml.cli.import_ import ImportSettings
 from fogml.cli.lab import NorthSettings
-from fogml.cli.replay import ReplaySettings
+from fogml.cli.model_commands import CompensateSettings, SweepSettings, TrainSettings
+from fogml.cli.run_commands import ImportSettings
 from fogml.cli.settings import Settings
-from fogml.cli.simulate import SimulateSettings
-from fogml.cli.sweep import SweepSettings
-from fogml.cli.train import TrainSettings
+from fogml.cli.twin_commands import ReplaySettings, SimulateSettings
 from fogml.errors import InputError
 from fogml.yaml_text import parse_yaml
 

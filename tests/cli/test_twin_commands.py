@@ -198,7 +198,7 @@ def test_a_card(invoke_json, invoke, tmp_path):
 
 
 def test_every_effect_has_a_whole_card(invoke_json):
-    from fogml.twin.card import card_values
+    from fogml.twin.pictures import card_values
 
     for id, declared in effects().items():
         card = card_values(declared)

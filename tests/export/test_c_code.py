@@ -15,10 +15,16 @@ from hypothesis import strategies as st
 from fogml.errors import InputError
 from fogml.export.c_fixed import EXP_ERROR as FIXED_EXP_ERROR
 from fogml.export.c_float import EXP_ERROR
-from fogml.export.c_program import FLAGS, RUNNING, CProgram, cortex_m4_size, cortex_m4_state_bytes
+from fogml.export.c_program import (
+    FLAGS,
+    RUNNING,
+    CProgram,
+    cortex_m4_size,
+    cortex_m4_state_bytes,
+    instructions_per_sample,
+)
 from fogml.export.c_source import c_source
 from fogml.export.check import expected_outputs
-from fogml.export.instructions import instructions_per_sample
 from fogml.export.plan import Plan
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model

@@ -14,7 +14,7 @@ from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.plan import Plan
 from fogml.export.points import History
 from fogml.features import own
-from fogml.features.memories import LAG, PLAY
+from fogml.features.operators import LAG, PLAY
 from fogml.features.own import Function, Recursion, RecursionOperator, declare
 from fogml.features.parse import parse_features
 from fogml.features.traced import larger, smaller, where

@@ -8,7 +8,7 @@ import pytest
 from fogml.export.c_program import CProgram
 from fogml.export.c_source import c_source
 from fogml.export.plan import Plan
-from fogml.features.curves import CURVES, sine_of_turns
+from fogml.features.operators import CURVES, sine_of_turns
 from fogml.features.own import Recursion, RecursionOperator
 from fogml.features.parse import parse_features
 from fogml.models.names import make_model

@@ -10,7 +10,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.gap.planning.fisher import information, merit, responses, unknowns
 from fogml.gap.planning.plan import plan_runs
-from fogml.gap.planning.plan_json import plan_values
+from fogml.gap.planning.plan_result import plan_values
 from fogml.gap.planning.programme_design import Design
 from fogml.gap.planning.programme_family import Family
 from fogml.gap.planning.rehearsal import FINE_S, Rehearsal, Together, stage

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.gap.own_simulator import by_column, has_column
 from fogml.gap.reading import rows_of
-from fogml.gap.replayed_column import by_column, has_column
 from fogml.runs.run import Run
 from fogml.twin.replay import replay
 from fogml.twin.simulate import simulate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from fogml.lab.acceptance_limits import read_limits
+from fogml.lab.acceptance_rows import read_limits
 from fogml.runs.run import Run
 from tests.lab.units import Unit
 

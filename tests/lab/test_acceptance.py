@@ -14,8 +14,7 @@ from click.testing import CliRunner
 from fogml.cli.main import app
 from fogml.errors import InputError
 from fogml.lab.acceptance import acceptance_json
-from fogml.lab.acceptance_limits import read_limits
-from fogml.lab.acceptance_rows import QUANTITIES
+from fogml.lab.acceptance_rows import QUANTITIES, read_limits
 from fogml.models.names import make_model
 from fogml.report.acceptance_page import acceptance_page, limit_words
 from fogml.runs.facts import Facts

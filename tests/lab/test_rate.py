@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.lab.rate_json import rate_json, unit_facts
 from fogml.lab.rate_pieces import find_oscillations, find_plateaus, merged
 from fogml.lab.rate_programmes import rate_runs
 from fogml.lab.rate_response import bandwidth, gain_of
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.optics import Coil
 from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin

@@ -13,9 +13,8 @@ from experiments.synthetic_world import World, cycle, programme
 from fogml.features.parse import parse_features
 from fogml.models import trial
 from fogml.models.auto import AutoModel
-from fogml.models.candidates import STANDARD, Candidate, candidates_for
+from fogml.models.candidates import STANDARD, Candidate, Score, candidates_for, choose
 from fogml.models.saved import load_model, save_model
-from fogml.models.score import Score, choose
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 

@@ -7,9 +7,8 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from fogml.errors import InputError
-from fogml.models.causes import CauseModel
+from fogml.models.causes import CauseModel, GroupedRows
 from fogml.models.saved import load_model, save_model
-from fogml.models.sized_groups import GroupedRows
 from fogml.models.table import TrainingTable
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.models.coefficient_errors import noise_covariance
 from fogml.models.joint import JointModel
 from fogml.models.linear import LinearRegressor
+from fogml.models.row_noise import noise_covariance
 from fogml.models.table import RunRows
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from fogml.features.features import Features
+from fogml.models.box import moves_both_ways
 from fogml.models.combination import LeftOut
-from fogml.models.directions import moves_both_ways
 from fogml.models.folds import dealt_blocks
 from fogml.models.mixed_effects import SizePriors, fit_mixed_effects
 from fogml.models.names import make_model

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-OUTSIDE = Path(__file__).parent / "outside_package" / "src"
+from tests.outside import in_new_process
+
+OUTSIDE = Path(__file__).parent / "outside_package"
 
 
-def in_new_process(folder: Path, points: str, code: str) -> str:
-    """What a program says where a package with these entry points is installed."""
-    info = folder / "fogml_trimmed-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: fogml-trimmed\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[fogml.regressors]\n{points}\n")
-    search = os.pathsep.join([str(folder), str(OUTSIDE), *filter(None, sys.path)])
-    answer = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": search}
-    )
-    assert answer.returncode == 0, answer.stderr
-    return answer.stdout.strip()
+def said(folder: Path, point: str, code: str) -> str:
+    return in_new_process(folder, OUTSIDE, f"[fogml.regressors]\n{point}\n", code)
 
 
 def test_it_keeps_the_contract_and_takes_parameters(tmp_path: Path) -> None:
@@ -33,11 +22,11 @@ def test_it_keeps_the_contract_and_takes_parameters(tmp_path: Path) -> None:
         "check_model(make_model('trimmed'))\n"
         "print(make_model('trimmed', 'T, dT', parameters={'share': 0.2}).regressor.share)"
     )
-    assert in_new_process(tmp_path, "trimmed = fogml_trimmed:TrimmedRegressor", code) == "0.2"
+    assert said(tmp_path, "trimmed = fogml_trimmed:TrimmedRegressor", code) == "0.2"
 
 
 def test_spikes_do_not_move_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(OUTSIDE))
+    monkeypatch.syspath_prepend(str(OUTSIDE / "src"))
     from fogml_trimmed import TrimmedRegressor
 
     x = np.linspace(-1.0, 1.0, 200)[:, None]
@@ -63,4 +52,23 @@ def test_a_faulty_one_is_named(tmp_path: Path, point: str, message: str) -> None
         "try: make_model('trimmed')\n"
         "except InputError as error: print(error)"
     )
-    assert message in in_new_process(tmp_path, point, code)
+    assert message in said(tmp_path, point, code)
+
+
+TAKEN = "'linear' is a regressor of fogml's own"
+MADE = "make_model('linear')"
+SAVED = "regressor_to_saved(TrimmedRegressor().fit(np.eye(3), np.ones(3)))"
+
+
+@pytest.mark.parametrize("attempt", [MADE, SAVED])
+def test_a_name_of_fogmls_own_is_refused(tmp_path: Path, attempt: str) -> None:
+    """What was saved under it would come back as another regressor."""
+    code = (
+        "import numpy as np; from fogml_trimmed import TrimmedRegressor\n"
+        "from fogml.errors import InputError; from fogml.models.names import make_model\n"
+        "from fogml.models.regressors import regressor_to_saved\n"
+        f"try: {attempt}\n"
+        "except InputError as error: print(error)"
+    )
+    told = said(tmp_path, "linear = fogml_trimmed:TrimmedRegressor", code)
+    assert told.startswith("entry point 'linear' of fogml-trimmed") and TAKEN in told

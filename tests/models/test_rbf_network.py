@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.evaluate import basis_functions, evaluate_network
 from fogml.models.rbf.network import Network, solve_network
+from fogml.models.rbf.rates import Edge
 
 INPUTS, CENTRES = 3, 7
 

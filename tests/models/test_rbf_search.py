@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from fogml.models.rbf import RBFRegressor
-from fogml.models.rbf.blocks import average_in_blocks
+from fogml.models.rbf.blocks import Frame, Level, average_in_blocks
 from fogml.models.rbf.centres import kmeans_centres
-from fogml.models.rbf.levels import Frame, Level
 from fogml.models.rbf.search import COARSE_ROWS, Search
 from fogml.models.rbf.tuning import Descent, OwnVariables, SharedVariables, TuningSettings
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from fogml.models.box import direction_is_told
 from fogml.models.combination import LeftOut
-from fogml.models.directions import direction_is_told
 from fogml.models.table import TrainingTable
 from fogml.models.weights import intervals_of, skill_of, weights_of
 

@@ -15,7 +15,7 @@ from experiments.real_files import long_logs
 from fogml.readers import spool as spools
 from fogml.readers.spool import Rows, Spool
 from fogml.runs import reader_process
-from fogml.runs.beside import Beside, interpolated
+from fogml.runs.other_rate import Beside, interpolated
 from fogml.runs.reader_process import StoredArray
 from fogml.runs.reading import read_blocks
 from fogml.runs.reading_limits import DEFAULT_LIMITS

@@ -11,12 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from experiments.results import html_page
-from fogml.benchmark.design import DESIGN
-from fogml.benchmark.diagnosis_score import diagnosis_figures
-from fogml.benchmark.drift_score import DriftMark, drift_figures
-from fogml.benchmark.rounds import RULES
+from fogml.benchmark.rounds import DESIGN, RULES
+from fogml.benchmark.score import DriftMark, diagnosis_figures, drift_figures
 from fogml.blind.scoring.values import score_values
-from fogml.cli.options_page import options_page
+from fogml.cli.docs_job import options_page
 from fogml.report import blind_page
 from fogml.report.axes_page import axes_page
 from fogml.report.benchmark_page import benchmark_page
@@ -26,8 +24,7 @@ from fogml.report.plan_page import plan_page
 from fogml.report.sweep_page import sweep_page
 from fogml.runs.run import Run
 from fogml.static_svg import Curve, line_figure
-from fogml.twin.card import card_values
-from fogml.twin.pictures import allan_curve, pictures, rate_curves
+from fogml.twin.pictures import allan_curve, card_values, pictures, rate_curves
 from fogml.twin.registry import effects
 from fogml.validation.inspection import inspection_json
 from fogml.validation.report_json import judgement_json

@@ -20,7 +20,7 @@ from fogml.report.figures_noise import term_deviation
 from fogml.report.index_page import loop_between
 from fogml.report.inspect_page import temperature_rates
 from fogml.report.page import Drawing
-from fogml.report.shading import segments_of, shade
+from fogml.report.style import segments_of, shade
 from fogml.runs.run import Run
 from fogml.static_svg import Curve, line_figure
 from tests.report.judgements import FLOOR, judged_run, judgement

@@ -10,7 +10,7 @@ import pytest
 from fogml.json_files import finite_json
 from fogml.lab.misalignment_json import misalignment_json
 from fogml.lab.misalignment_simulation import TableUnit, measurements
-from fogml.lab.navigation_cost import navigation_costs
+from fogml.lab.navigation import navigation_costs
 from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.north_positions import simulated_positions

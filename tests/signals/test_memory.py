@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from fogml.errors import InputError
-from fogml.features.memories import SINCE_ON
+from fogml.features.operators import SINCE_ON
 from fogml.signals.memory import Lag, Play
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import zeta
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.signals import random_noise
 from fogml.signals.allan import allan_deviation
 

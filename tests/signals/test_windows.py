@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals import window_streams as streams
 from fogml.signals.clock import Clock
 from fogml.signals.windows import block_difference, exponential, first_difference, slope
 
-FloatArray = NDArray[np.float64]
 WINDOWED = {"block": block_difference, "slope": slope, "exp": exponential}
 STREAMS: dict[str, Any] = {
     "block": streams.BlockDifferenceStream,

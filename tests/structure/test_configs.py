@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from fogml.cli.sweep import SweepSettings
+from fogml.cli.model_commands import SweepSettings, TrainSettings
 from fogml.cli.sweep_job import plan_of
-from fogml.cli.train import TrainSettings
 from fogml.features.parse import parse_features
 from fogml.models.names import make_model
 from fogml.validation.limits import check_limits

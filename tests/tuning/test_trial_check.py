@@ -9,7 +9,7 @@ import pytest
 from optuna.trial import TrialState, create_trial
 
 from fogml.errors import InputError
-from fogml.tuning.trial_check import check_trials
+from fogml.tuning.study import check_trials
 from tests.tuning.world import plan
 
 SOUND: dict[str, Any] = {

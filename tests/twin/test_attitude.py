@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from fogml.arrays import FloatArray
 from fogml.runs.facts import EARTH_RATE_DEG_H, Direction, Facts, Heading
-from fogml.runs.run import FloatArray
 from fogml.twin.attitude import attitude, earth_field
 from fogml.twin.inputs import Inputs
 from fogml.twin.registry import effect

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.testing import check_effect
 from fogml.twin.effect import (
     BiasEffect,

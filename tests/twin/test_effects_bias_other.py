@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import bisect
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.optics import Coil

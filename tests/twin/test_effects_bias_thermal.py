@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import nominal_columns
 from fogml.twin.optics import Coil

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.registry import effect

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fogml.arrays import FloatArray
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.twin.effect import BiasEffect, LoggerEffect, NoiseEffect, ScaleFactorEffect, SensorEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.optics import Coil

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.reading import read_run
-from fogml.runs.run import FloatArray
 from fogml.twin.effect import LoggerEffect, LoopEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.effect import LoggerEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory

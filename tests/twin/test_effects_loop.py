@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 from fogml.twin.effect import LoopEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory

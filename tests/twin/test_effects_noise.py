@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.signals.allan import allan_deviation
 from fogml.signals.noise_terms import noise_terms_of
 from fogml.twin.effect import NoiseEffect

@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.noise import NoiseConstants

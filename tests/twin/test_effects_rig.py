@@ -10,8 +10,8 @@ from hypothesis import given as drawn
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from fogml.arrays import FloatArray
 from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
-from fogml.runs.run import FloatArray
 from fogml.signals.sample_means import mean_cosine
 from fogml.twin.effects.rig import InputAxisMisalignment, scale_factor_loss_ppm
 from fogml.twin.inputs import Inputs

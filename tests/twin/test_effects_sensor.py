@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogml.runs.run import FloatArray, Run
+from fogml.arrays import FloatArray
+from fogml.runs.run import Run
 from fogml.runs.steps import recorded_step
 from fogml.twin.effect import SensorEffect
 from fogml.twin.inputs import Inputs

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fogml.arrays import FloatArray
 from fogml.features.parse import parse_features
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.memory import Memory
 
 RNG = np.random.default_rng(11)

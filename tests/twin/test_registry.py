@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +14,7 @@ from fogml.twin import registry
 from fogml.twin.effect import BiasEffect
 from fogml.twin.effects.shupe import ShupePure
 from fogml.twin.effects.unit import Ageing
+from tests.outside import in_new_process
 
 OUTSIDE = Path(__file__).parent / "outside_package"
 # The head of the catalogue: what a diagnosis offers unless told otherwise, noise terms aside.
@@ -182,26 +180,6 @@ def test_what_is_no_whole_effect_is_refused(declared: type, message: str) -> Non
     assert set(registry.effects()) == before
 
 
-def install(folder: Path, entry_points: str) -> Path:
-    """Put the outside package on a path as an installer would, with these entry points."""
-    project = tomllib.loads((OUTSIDE / "pyproject.toml").read_text())["project"]
-    info = folder / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
-    info.mkdir()
-    metadata = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
-    (info / "METADATA").write_text(metadata)
-    (info / "entry_points.txt").write_text(entry_points)
-    return folder
-
-
-def in_new_process(path: Path, code: str) -> str:
-    search = os.pathsep.join([str(path), str(OUTSIDE / "src"), *filter(None, sys.path)])
-    answer = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": search}
-    )
-    assert answer.returncode == 0, answer.stderr
-    return answer.stdout.strip()
-
-
 def test_an_outside_package_adds_an_effect_that_keeps_the_contract(tmp_path: Path) -> None:
     points = tomllib.loads((OUTSIDE / "pyproject.toml").read_text())["project"]["entry-points"]
     text = "".join(
@@ -212,7 +190,7 @@ def test_an_outside_package_adds_an_effect_that_keeps_the_contract(tmp_path: Pat
         "from fogml.testing import check_effect; from fogml.twin.registry import effect, effects\n"
         "check_effect(effect('stray_light')); print(list(effects())[-1], 'ageing' in effects())"
     )
-    assert in_new_process(install(tmp_path, text), code) == "stray_light True"
+    assert in_new_process(tmp_path, OUTSIDE, text, code) == "stray_light True"
 
 
 @pytest.mark.parametrize(
@@ -230,5 +208,5 @@ def test_a_faulty_outside_effect_is_named(tmp_path: Path, point: str, message: s
         "    try: effects()\n"
         "    except InputError as error: print(error)\n"
     )
-    said = in_new_process(install(tmp_path, f"[fogml.effects]\n{point}\n"), code).splitlines()
+    said = in_new_process(tmp_path, OUTSIDE, f"[fogml.effects]\n{point}\n", code).splitlines()
     assert len(said) == 2 and all(message in line for line in said)

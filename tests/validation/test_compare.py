@@ -11,11 +11,10 @@ import pytest
 from fogml.errors import InputError
 from fogml.models.names import make_model
 from fogml.runs.run import Run
-from fogml.validation.compare import compare
+from fogml.validation.compare import compare, leave_one_run_out
+from fogml.validation.floors import floor_interval
 from fogml.validation.index_search import Candidate, candidates, train_until_index
 from fogml.validation.judge import judge
-from fogml.validation.leave_one_out import leave_one_run_out
-from fogml.validation.reach import floor_interval
 from tests.validation.known_drift import KnownDrift
 
 pytestmark = pytest.mark.usefixtures("without_noise_terms")

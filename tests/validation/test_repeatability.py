@@ -12,8 +12,8 @@ from fogml.errors import InputError
 from fogml.report import spreadsheet, train_page
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
+from fogml.validation.compare import leave_one_run_out
 from fogml.validation.judge import judge
-from fogml.validation.leave_one_out import leave_one_run_out
 from fogml.validation.report_json import judgement_json
 from tests.validation.known_drift import KnownDrift
 

@@ -9,9 +9,8 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.validation.judge import judge
-from fogml.validation.metrics import RunMetrics
+from fogml.validation.metrics import RunMetrics, turn_on_time
 from fogml.validation.report_json import judgement_json
-from fogml.validation.turn_on import turn_on_time
 from tests.validation.known_drift import KnownDrift
 
 pytestmark = pytest.mark.usefixtures("without_noise_terms")

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.signatures import Stack
 from fogml.json_files import write_json
 from fogml.outputs import whole_file
-from fogml.runs.run import FloatArray
 from fogml.signals.averages import block_averages
 from fogml.signals.noise_model import NoiseModel
 

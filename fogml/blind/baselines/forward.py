@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from scipy.special import expit
 
+from fogml.arrays import FloatArray
 from fogml.blind.baselines.answer import Finding, write_answer
 from fogml.blind.baselines.regression import Regression
 from fogml.blind.folders import CaseFiles
 from fogml.blind.signatures import Atom, smooth_curves
-from fogml.runs.run import FloatArray
 
 MOST = 4
 """Effects at most."""

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from scipy.special import expit
 
+from fogml.arrays import FloatArray
 from fogml.blind.baselines.answer import Finding, Prediction, write_answer
 from fogml.blind.baselines.regression import Regression
 from fogml.blind.folders import CaseFiles
 from fogml.blind.signatures import Stack
-from fogml.runs.run import FloatArray
 
 
 def abstain(case: CaseFiles, out: Path) -> None:

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from scipy.special import expit
 
+from fogml.arrays import FloatArray
 from fogml.blind.baselines.answer import Finding, Prediction, write_answer
 from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.signatures import Stack
 from fogml.blind.truth import Truth, read_contributions
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 
 

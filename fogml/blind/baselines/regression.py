@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import BoolArray, FloatArray
 from fogml.blind.baselines.answer import Prediction
 from fogml.blind.folders import CaseFiles
 from fogml.blind.signatures import Atom, Stack, atoms, noise_of
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 
 _BLIND = 1e-6
@@ -102,7 +101,7 @@ class Regression:
         gone = np.linalg.norm(left, axis=0) <= _BLIND * np.linalg.norm(columns, axis=0)
         return np.where(gone, 0.0, left)
 
-    def visible(self, columns: FloatArray) -> NDArray[np.bool_]:
+    def visible(self, columns: FloatArray) -> BoolArray:
         """Atoms whose columns would rise over the noise at the largest usual amplitude, shape (k,)."""
         candidates = self.stack.model.candidates()
         largest = [max(map(abs, candidates[atom.id].amplitude.tactical)) for atom in self.atoms]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.blind.frame.record import FloatArray
+from fogml.arrays import FloatArray
 
 CASE, HUB, ELECTRONICS, PLATE, PLATE_DEEP = range(5)
 FIRST_SHELL = 5

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Demands
-from fogml.blind.frame.record import FloatArray
 
 _COLDEST, _HOTTEST = -42.0, 72.0
 

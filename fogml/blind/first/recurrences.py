@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.blind.frame.record import FloatArray
+from fogml.arrays import FloatArray
 
 _DEEPEST = 300.0
 """Largest decay within a block, as an exponent; e to this still is a float."""

@@ -10,7 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogml.blind.frame.record import FloatArray, SetUp, World
+from fogml.arrays import FloatArray
+from fogml.blind.frame.record import SetUp, World
 
 Shape = dict[str, float]
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.signal import lfilter
 
-from fogml.blind.frame.record import FloatArray
+from fogml.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from fogml.blind.frame.record import FloatArray
+from fogml.arrays import FloatArray
 
 PRIOR_SD = {"e0": 500.0, "k1": 50.0, "k2": 0.5, "b0": 5.0, "b1": 0.05, "b2": 5e-4, "g": 0.5, "m": 2.0}
 """Standard deviations of the priors about 0, units as `Constants`."""

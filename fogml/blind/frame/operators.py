@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.signal import lfilter
 
-from fogml.blind.frame.record import FloatArray
+from fogml.arrays import FloatArray
 
 
 def late(x: FloatArray, time_constant_s: float, step_s: float) -> FloatArray:

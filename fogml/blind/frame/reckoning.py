@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Additive, Distorting
 from fogml.blind.frame.noise import Projected
-from fogml.blind.frame.record import FloatArray
 from fogml.blind.frame.strength import Acting, Scales, acting_before, recorded
 from fogml.blind.frame.unit import Unit, UnitRun
 

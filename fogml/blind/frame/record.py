@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from fogml.arrays import FloatArray, IntArray
+from fogml.blind.frame.nominal import WINDOW_S, delta_of_record
 
 EARTH_DEG_H = 15.041067
 
@@ -24,6 +25,14 @@ class Told(Protocol):
     @property
     def powered_on(self) -> float:
         """Power-on on the run's clock [s]."""
+
+    @property
+    def duration_s(self) -> float:
+        """How long the run lasts [s]."""
+
+    @property
+    def turns(self) -> Sequence[tuple[float, float, float]]:
+        """Turns of the table: start and end [s], rate [deg/s]."""
 
 
 @dataclass(frozen=True)
@@ -102,3 +111,60 @@ class World:
         end = harmonic * np.radians(self.angle) - np.radians(phase_deg)
         half = 0.5 * harmonic * np.radians(self.table_rate * self.sample_s)
         return np.cos(end - half) * np.sinc(half / np.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Finer times `t` [s] that a plant is worked out at, from before a run to its end, `step_s` apart.
+
+    `at` are the places of the run's n samples among them.
+    """
+
+    programme: Told
+    sample_s: float
+    step_s: float
+    t: FloatArray
+    at: IntArray
+
+    @classmethod
+    def of(cls, programme: Told, sample_s: float, finest_s: float, longest_before_s: float) -> Course:
+        """From power-on or so long before the run, and two windows before it at least."""
+        per = max(int(np.ceil(sample_s / finest_s)), 1)
+        step_s = sample_s / per
+        wanted_s = max(min(-programme.powered_on, longest_before_s), 2.0 * WINDOW_S + sample_s)
+        before = int(np.ceil(wanted_s / sample_s)) * per
+        count = round(programme.duration_s / sample_s)
+        t = np.asarray(step_s * np.arange(-before, count * per, dtype=np.float64))
+        return cls(programme, sample_s, step_s, t, before + per * np.arange(count, dtype=np.int64))
+
+    @cached_property
+    def table_rate(self) -> FloatArray:
+        """Rate of the table at the run's samples [deg/s], shape (n,); a later turn has the word."""
+        time = self.t[self.at]
+        rates = np.zeros(len(time))
+        for start, stop, rate in self.programme.turns:
+            rates[(time > start + 1e-6) & (time < stop + 1e-6)] = rate
+        return rates
+
+    @cached_property
+    def angle(self) -> FloatArray:
+        """The table's angle [deg] at the end of each sample, shape (n,)."""
+        return np.cumsum(self.table_rate * self.sample_s)
+
+    def world(self, full: dict[str, FloatArray], winding: FloatArray, **more: Any) -> World:
+        """What happened, of temperatures of nodes and of the winding's parts at the finer times."""
+        time, at, per_minute = self.t[self.at], self.at, 60.0 / self.step_s
+        return World(
+            time=time,
+            sample_s=self.sample_s,
+            nodes={name: values[at] for name, values in full.items()},
+            rates={name: per_minute * np.gradient(values)[at] for name, values in full.items()},
+            shell_rates=per_minute * np.gradient(winding, axis=0)[at],
+            # By the samples, as a replay has it: what a coarse interval hides of DeltaT is no effect.
+            deltas={name: delta_of_record(time, full[name][at]) for name in ("T_in", "T_out")},
+            table_rate=self.table_rate,
+            angle=self.angle,
+            time_on=time - self.programme.powered_on,
+            programme=self.programme,
+            **more,
+        )

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Additive, Distorting, Form, Sensing, Shape
 from fogml.blind.frame.noise import Projected
-from fogml.blind.frame.record import FloatArray
 from fogml.blind.frame.unit import Unit, UnitRun
 
 _LEAST_OUTSIDE = 0.02

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame import nominal
+from fogml.blind.frame.form import Demands, Form
+from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.operators import late
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import World
 from fogml.blind.frame.strength import Scales
 from fogml.blind.frame.unit import Unit, UnitRun
 
@@ -60,29 +64,23 @@ class Instruments:
 
 def draw_instruments(
     rng: np.random.Generator,
-    faces: bool,
-    fine: bool,
-    needed: tuple[str, ...],
-    white: float,
-    slopes: tuple[float, float],
-) -> Instruments:
-    """A unit's instruments: as good as its gyro takes them, so that a replay's error is lost in the noise.
-
-    Parameters
-    ----------
-    faces, fine, needed
-        Whether both faces of the coil are wanted, whether good sensors are, and which further columns.
-    white
-        The gyro's white noise in a sample, rms [deg/h].
-    slopes
-        What a degree does to a replay's output, rms, at rest and in a fast turn [deg/h/degC].
-    """
+    forms: Sequence[type[Form]],
+    demands: Demands,
+    noise: StateNoise,
+    sample_s: float,
+) -> tuple[nominal.Constants, Instruments]:
+    """A gyro's constants, and instruments as good as it takes them: a replay's error is lost in its noise."""
+    constants = nominal.draw_constants(rng, True)
+    rest, turning = nominal.temperature_slopes(constants, sample_s)
+    turning *= demands.top_rate * float(demands.turns and not demands.small_rates)
+    needed = tuple(dict.fromkeys(column for f in forms for column in f.records))
+    fine, white = any(f.fine_sensors for f in forms), noise.N / np.sqrt(sample_s / 3600.0)
+    faces = any(f.faces for f in forms)
     layout = str(rng.choice(["two", "two", "four"] if faces else ["one", "two", "four"]))
     chance = {"T_case": 0.4, "T_chamber": 0.6, "T_electronics": 0.3, "supply": 0.25, "humidity": 0.25}
     chance |= {"compressor": 0.3, "heater": 0.3, "vibration": 0.2, "power": 0.3}
     others = [name for name, p in chance.items() if (rng.random() < p) | (name in needed)]
     others += [name for name in needed if name not in chance]
-    rest, turning = slopes
     most = min(_AT_REST * white / (rest + 1e-30), _IN_TURNS * white / (turning + 1e-30))
     error = min(float(np.exp(rng.uniform(np.log(1e-3), np.log(8e-3)))) * (0.3 if fine else 1.0), most)
     steps = [q for q in (0.02, 0.01, 0.005, 0.002, 0.001, 1e-4) if q < 2.0 * error]
@@ -96,7 +94,10 @@ def draw_instruments(
         return Thermometer(place, float(gain), float(offset), float(lag * rng.uniform(0.2, 1.0)))
 
     each = {name: thermometer(name, place) for name, place in places.items()}
-    return Instruments(layout, tuple(others), error, max(steps, default=1e-5), each)
+    instruments = Instruments(layout, tuple(others), error, max(steps, default=1e-5), each)
+    if not instruments.two_faces:
+        constants = nominal.Constants(**(constants.as_dict() | {"g": 0.0}))
+    return constants, instruments
 
 
 @dataclass(frozen=True, eq=False)

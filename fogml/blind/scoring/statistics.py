@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtri
 from scipy.stats import binom
 
-FloatArray = NDArray[np.float64]
+from fogml.arrays import FloatArray
 
 LEVEL = 0.95
 """Coverage of every interval of a score."""

@@ -4,19 +4,143 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import fogml
-from fogml.blind.scoring.breakdowns import confusion, left_out, thinned, worst
+from fogml.blind.plan import check_use, record_use, uses
+from fogml.blind.scoring.answers import NAMED
 from fogml.blind.scoring.by_reality import by_form, by_reality
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.scoring.marks_file import Marks
-from fogml.blind.scoring.statistics import Bin
+from fogml.blind.scoring.statistics import Bin, proportion
 from fogml.blind.scoring.table import BY_KEY, calibration, curve, rows
-from fogml.blind.seeds import check_use, record_use, uses
 from fogml.blind.truth import KINDS, STRATUM_NAMES
+
+UNKNOWN, NOTHING = "unknown", "nothing"
+WORST = 10
+_CURVE_POINTS = 200
+
+
+def confusion(marks: Sequence[Mark]) -> dict[str, Any]:
+    """True effect against what was named, over cases with one missing effect.
+
+    An effect counts as answered by its own name where it is in a named class, else by the name of the
+    most certain named item, else as `UNKNOWN` or `NOTHING`. ``in_class`` counts, of the hits, those in
+    classes of several.
+    """
+    chosen = [m for m in marks if m.truth.kind == "one"]
+    pairs: Counter[tuple[str, str]] = Counter()
+    in_class: Counter[str] = Counter()
+    for m in chosen:
+        true = m.truth.effects[0].name
+        holding = next((item for item in m.named if true in item.members), None)
+        if holding is not None:
+            pairs[true, true] += 1
+            in_class[true] += len(holding.members) > 1
+        elif m.named:
+            pairs[true, m.named[0].effect] += 1
+        elif m.failure:
+            pairs[true, "failed"] += 1
+        else:
+            pairs[true, UNKNOWN if m.unknown >= NAMED else NOTHING] += 1
+    true_names = sorted({true for true, _ in pairs})
+    others = sorted({named for _, named in pairs} - set(true_names) - {UNKNOWN, NOTHING, "failed"})
+    ends = [name for name in (UNKNOWN, NOTHING, "failed") if any(named == name for _, named in pairs)]
+    answered = [*true_names, *others, *ends]
+    return {
+        "true": true_names,
+        "answered": answered,
+        "counts": [[pairs[true, named] for named in answered] for true in true_names],
+        "in_class": [in_class[true] for true in true_names],
+    }
+
+
+def left_out(marks: Sequence[Mark]) -> list[dict[str, Any]]:
+    """For each effect that was left out of the candidates, and each invented one: what became of it."""
+    rows = []
+    chosen = [m for m in marks if m.truth.kind in ("unknown_left_out", "unknown_invented")]
+    for name in sorted({m.truth.unknown[0].name for m in chosen if m.truth.unknown}):
+        own = [m for m in chosen if m.truth.unknown and m.truth.unknown[0].name == name]
+        wrong = Counter(item.effect for m in own for item in m.named if not item.right)
+        relatives = Counter(id for m in own for id in m.relatives)
+        rows.append(
+            {
+                "effect": name,
+                "in_library": own[0].truth.unknown[0].id is not None,
+                "d_prime": float(np.median([m.d_prime for m in own])),
+                "flagged": asdict(proportion([m.unknown >= NAMED for m in own])),
+                "wrong_name": asdict(proportion([m.wrong_name for m in own])),
+                "wrong_names": dict(wrong.most_common()),
+                "relatives": dict(relatives.most_common()),
+            }
+        )
+    return rows
+
+
+def worst(marks: Sequence[Mark], count: int = WORST) -> list[dict[str, Any]]:
+    """The cases with the most certain wrong answers, worst first, each with what is wrong."""
+    scored = sorted(((_badness(m), m) for m in marks), key=lambda pair: (-pair[0], pair[1].truth.case))
+    return [
+        {
+            "case": m.truth.case,
+            "kind": m.truth.kind,
+            "stratum": m.truth.stratum,
+            "d_prime": m.d_prime,
+            "true": [effect.name for effect in m.truth.effects],
+            "left_out": [effect.name for effect in m.truth.unknown],
+            "named": [{"class": list(i.members), "probability": i.probability} for i in m.named],
+            "unknown": None if m.failure else m.unknown,
+            "verdict": m.verdict,
+            "wrong": _wrong(m),
+        }
+        for badness, m in scored[:count]
+        if badness > 0.0
+    ]
+
+
+def thinned(curve: Any) -> dict[str, list[float]]:
+    """A curve's corners in at most so many points that a page can draw it."""
+    n = len(curve.false_positive)
+    places = np.unique(np.linspace(0, n - 1, min(n, _CURVE_POINTS)).astype(np.intp)).tolist()
+    return {
+        "false_positive": [float(curve.false_positive[i]) for i in places],
+        "true_positive": [float(curve.true_positive[i]) for i in places],
+    }
+
+
+def _badness(m: Mark) -> float:
+    """How wrong: certain wrong names first, then what was missed, both by the strength of the effect."""
+    if m.failure:
+        return 10.0
+    wrong = sum(item.probability for item in m.named if not item.right)
+    missed = float(bool(m.truth.known) and not m.kept)
+    weight = 1.0 if not m.truth.effects else float(np.log2(1.0 + m.d_prime))
+    surprise = abs(m.unknown - float(bool(m.truth.unknown))) if m.truth.kind != "wrong_thermal" else 0.0
+    return 3.0 * wrong + weight * (0.5 * missed + 0.3 * (surprise if surprise > NAMED else 0.0))
+
+
+def _wrong(m: Mark) -> str:
+    """What is wrong with an answer, in a few words."""
+    if m.failure:
+        return m.failure
+    parts = []
+    wrong = [item.effect for item in m.named if not item.right]
+    if wrong:
+        parts.append(f"names {', '.join(wrong)}")
+    held = {id for item in m.named for id in item.members}
+    missed = [effect.name for effect in m.truth.known if effect.id not in held]
+    if missed:
+        parts.append(f"misses {', '.join(missed)}")
+    if m.truth.unknown and m.unknown < NAMED:
+        parts.append("sees no unknown")
+    elif not m.truth.unknown and m.unknown >= NAMED and m.truth.kind != "wrong_thermal":
+        parts.append("sees an unknown that is none")
+    return "; ".join(parts)
+
 
 SCHEMA = "fogml.blind_score/1"
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.signal import lfilter
 
-from fogml.blind.frame.record import FloatArray
+from fogml.arrays import FloatArray
 
 
 def preisach(

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from fogml.blind.frame.record import FloatArray
+from fogml.arrays import FloatArray
 
 NAMES = ("can", "lid", "spool", "base", "board", "optics", "source")
 """Nodes beside the winding; the cells of the winding follow them, by radius and within it by height."""

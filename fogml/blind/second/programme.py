@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Demands
-from fogml.blind.frame.record import FloatArray
 
 _COLDEST, _HOTTEST = -40.0, 70.0
 Corners = list[tuple[float, float]]

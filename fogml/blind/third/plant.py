@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fogml.blind.frame.record import FloatArray
+from fogml.arrays import FloatArray
 
 NAMES = ("cover", "mount", "outer", "middle", "inner", "hub", "tray", "board", "optics", "source")
 _KELVIN = 273.15

@@ -13,11 +13,11 @@ from typing import Literal
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.model import EffectValue
 from fogml.gap.planning.rehearsal import ExpectedRuns, Stage
 from fogml.intervals import Z90
-from fogml.runs.run import FloatArray
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.quantities import Quantity
 from fogml.twin.registry import effect

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.causes import card_of
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
@@ -21,7 +22,6 @@ from fogml.gap.result_parts import Rehearsed
 from fogml.gap.rows import Rows
 from fogml.gap.search import Search
 from fogml.gap.shapes import usual_shapes
-from fogml.runs.run import FloatArray
 from fogml.signals.bases import corners
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.programme import Programme, programme_from

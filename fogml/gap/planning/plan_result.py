@@ -1,17 +1,22 @@
-"""The result of planning: runs, what they are expected to tell, and runners-up."""
+"""The result of planning: runs, what they are expected to tell, runners-up; and all that as ``plan.json``."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
 
+import numpy as np
+
+from fogml.arrays import FloatArray
 from fogml.gap.planning.fisher import Criterion
-from fogml.gap.planning.rehearsal import Rehearsal
+from fogml.gap.planning.rehearsal import COARSE_S, FINE_S, Rehearsal
 from fogml.gap.planning.separating import LEAST_DISTANCE
 from fogml.gap.result_parts import Rehearsed
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.programme import Programme
+from fogml.twin.schedule import Track
 
 _BETTER = 0.9
 
@@ -145,3 +150,122 @@ class Plan:
     def outlook(self) -> Outlook:
         """What is expected of all runs together."""
         return self.runs[-1].outlook
+
+
+SCHEMA = "fogml.plan/1"
+_MOST_POINTS = 600
+
+
+def programme_file(number: int) -> str:
+    """Name of the file of a plan's run, counted from 0."""
+    return "programme.yaml" if number == 0 else f"programme-{number + 1}.yaml"
+
+
+def simulation_file(number: int) -> str:
+    """Name of the file that `fogml simulate` takes for a plan's run, counted from 0."""
+    return "simulation.yaml" if number == 0 else f"simulation-{number + 1}.yaml"
+
+
+def plan_values(plan: Plan) -> dict[str, Any]:
+    """The content of ``plan.json``, schema ``fogml.plan/1``."""
+    return {
+        "schema": SCHEMA,
+        "twin": plan.twin,
+        "grade": plan.grade,
+        "data": "synthetic: expected from the twin's responses and noise, nothing was measured",
+        "criterion": plan.criterion,
+        "hours": plan.hours,
+        "total_hours": sum(run.programme.total_hours for run in plan.runs),
+        "limits_degC": list(plan.limits),
+        "noise": {"N": plan.noise.N, "B": plan.noise.B, "K": plan.noise.K},
+        "sample_s": {"search": COARSE_S, "figures": FINE_S},
+        "least_distance": LEAST_DISTANCE,
+        **_outlook(plan.outlook),
+        "runs": [_run(number, run) for number, run in enumerate(plan.runs)],
+        "rehearsal": [{**asdict(r), "named_as": list(r.named_as)} for r in plan.rehearsal],
+        "assumed": list(plan.assumed),
+    }
+
+
+def _run(number: int, run: PlannedRun) -> dict[str, Any]:
+    return {
+        "programme": programme_file(number),
+        "simulation": simulation_file(number),
+        "summary": run.summary,
+        "hours": run.programme.total_hours,
+        "input_axis": run.facts.as_dict().get("input_axis"),
+        **_outlook(run.outlook),
+        "alternatives": [
+            {
+                "summary": summary,
+                "hours": programme.total_hours,
+                **_outlook(outlook),
+                "programme": programme.as_dict(),
+            }
+            for programme, summary, outlook in run.alternatives
+        ],
+        "profile": profile(run.programme)
+        | {"coil": _thinned(run.rehearsal.rows.time_s, run.rehearsal.rows.temperature)},
+    }
+
+
+def _outlook(outlook: Outlook) -> dict[str, Any]:
+    return {
+        "wanted": [
+            {
+                "name": e.name,
+                "unit": e.unit,
+                "usual": e.usual,
+                "prior_se": e.prior,
+                "se": e.se,
+                "shown": e.shown,
+            }
+            for e in outlook.errors
+        ],
+        "correlations": np.round(outlook.correlations, 6).tolist(),
+        "separations": [
+            {
+                "separates": list(s.members),
+                "distance": s.distance,
+                "enough": s.enough,
+                "lengths": {id: float(s.pairs[i, i]) for i, id in enumerate(s.members)},
+                "pairs": [
+                    {"true": a, "taken_for": b, "distance": float(s.pairs[i, j])}
+                    for i, a in enumerate(s.members)
+                    for j, b in enumerate(s.members)
+                    if i != j
+                ],
+            }
+            for s in outlook.separations
+        ],
+    }
+
+
+def profile(programme: Programme) -> dict[str, Any]:
+    """What a programme does over time: set point [degC], table rate [deg/s], switches, yaw [deg].
+
+    Each as times [s] and values; set point and rate are linear in between, the others hold.
+    """
+    schedule = programme.schedule
+    told = {"set_point": _knots(schedule.set_point), "table_rate": _knots(schedule.table_rate)}
+    for what in ("power", "fan", "compressor", "yaw"):
+        track = schedule.settings[what]
+        if len(track.times) > 1:
+            told[what] = _knots(track)
+    return told
+
+
+def _knots(track: Track) -> dict[str, list[float | None]]:
+    return {
+        "time_s": [max(time, 0.0) for time in track.times],
+        # What is left to the chamber has no value of its own.
+        "value": [None if math.isnan(value) else value for value in track.values],
+    }
+
+
+def _thinned(time: Any, values: Any) -> dict[str, list[float]]:
+    step = max(1, -(-len(time) // _MOST_POINTS))
+    return {
+        "time_s": np.round(time[::step], 1).tolist(),
+        "value": np.round(values[::step], 3).tolist(),
+    }

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from fogml.arrays import FloatArray
 from fogml.gap.frame import Setting, fixed_columns, whitener_of
 from fogml.gap.linear_gaussian import LinearGaussian
 from fogml.gap.model import TwinModel
@@ -19,7 +20,6 @@ from fogml.gap.rows import Rows, slopes
 from fogml.gap.scene import Scene
 from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.plant.heat import SelfHeating

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.gap.model import EffectValue
 from fogml.gap.planning.programme_design import Mounting
@@ -28,7 +29,6 @@ from fogml.gap.planning.rehearsal import FINE_S, ExpectedRuns, Rehearsal, Stage,
 from fogml.gap.result import SeparatingRun
 from fogml.gap.shapes import GridNode, grid
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Quantity

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.model import EffectValue
 from fogml.gap.planning.fisher import stated_or_usual
 from fogml.gap.planning.programme_design import Design
@@ -16,7 +17,6 @@ from fogml.gap.planning.rehearsal import COARSE_S, FINE_S, Rehearsal, stage
 from fogml.gap.planning.separating import LEAST_DISTANCE, run_of
 from fogml.gap.result import SeparatingRun
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.registry import effect

@@ -1,17 +1,17 @@
-"""Training rows averaged in blocks of time, for the tuning of a network's shape."""
+"""Training rows as a search sees them: averaged in blocks of time, standardised; and when it stops."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
+from fogml.models.folds import dealt_folds
+from fogml.models.rbf.objective import Objective, Shape
 from fogml.signals.averages import BlockAverages, block_averages
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 _MIXED = 0.05
 """Share of an input's variance within blocks beyond which rows are taken not to be in order of time."""
@@ -140,3 +140,108 @@ def _cells(inputs: FloatArray, cells: int) -> IndexArray:
         rank[order] = every - np.repeat(starts, sizes)
         label = 2 * label + (rank >= (sizes[label] + 1) // 2)
     return label
+
+
+PATIENCE = 15
+"""Iterations without a smaller error on held-out rows after which a descent ends."""
+
+
+def held_out_rows(count: int, everything: bool = False) -> tuple[IndexArray, IndexArray]:
+    """Indices of rows fitted to and of rows held out: every fifth block of time, or none."""
+    rows = np.arange(count, dtype=np.intp)
+    if everything:
+        return rows, rows[:0]
+    held = dealt_folds(count) == 0
+    return rows[~held], rows[held]
+
+
+class Watch:
+    """Keeps the shape with the least mean squared error on held-out rows, and ends what gains nothing.
+
+    Parameters
+    ----------
+    objective
+        The objective on the rows fitted to, for its output weights.
+    inputs, linear, target
+        Held-out rows: network inputs (n, d), linear columns (n, p), target (n,).
+
+    Attributes
+    ----------
+    best, error
+        The shape kept, None before the first, and its mean squared error.
+    """
+
+    def __init__(
+        self, objective: Objective, inputs: FloatArray, linear: FloatArray, target: FloatArray
+    ) -> None:
+        self._objective = objective
+        self._held = Objective(inputs, linear, target)
+        self.best: Shape | None = None
+        self.error = float("inf")
+        self._since = 0
+
+    def __call__(self, shape: Shape) -> None:
+        """See a shape; raises StopIteration once `PATIENCE` of them in a row were no better."""
+        error = self._held.mean_square(shape, self._objective.weights(shape))
+        if error < self.error:
+            self.best, self.error, self._since = shape, error, 0
+            return
+        self._since += 1
+        if self._since >= PATIENCE:
+            self._since = 0
+            raise StopIteration
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Mean and standard deviation of the inputs, shape (k,), and of the target."""
+
+    shift: FloatArray
+    scale: FloatArray
+    target_shift: float
+    target_scale: float
+
+    @classmethod
+    def of(cls, inputs: FloatArray, target: FloatArray) -> Frame:
+        """The frame of training rows; what does not vary is left unscaled."""
+        shift, scale = inputs.mean(axis=0), inputs.std(axis=0)
+        scale = np.where(scale > 1e-12 * np.maximum(np.abs(shift), 1e-300), scale, 1.0)
+        deviation = float(target.std())
+        return cls(shift, scale, float(target.mean()), deviation if deviation > 0.0 else 1.0)
+
+
+class Level:
+    """Training rows averaged to some coarseness, standardised.
+
+    Parameters
+    ----------
+    rows
+        Averaged rows.
+    frame
+        Standardisation of inputs and target.
+    seen
+        Indices of the network's inputs.
+    device, dtype
+        Where torch works the objective out, and in what.
+    """
+
+    def __init__(self, rows: AveragedRows, frame: Frame, seen: IndexArray, device: str, dtype: str) -> None:
+        inputs = (rows.inputs - frame.shift) / frame.scale
+        self.linear = np.column_stack([inputs, np.ones(len(inputs))])
+        self.inputs = np.ascontiguousarray(inputs[:, seen])
+        self.target = (rows.target - frame.target_shift) / frame.target_scale
+        self.in_time, self.per_row = rows.in_time, rows.per_row
+        self._device, self._dtype = device, dtype
+
+    def __len__(self) -> int:
+        return len(self.target)
+
+    def objective(self, evidence: bool, share: float) -> tuple[Objective, Watch | None]:
+        """The objective, and what watches a descent where it is not the evidence."""
+        fitted, held = held_out_rows(len(self), everything=evidence)
+        rows = self.inputs[fitted], self.linear[fitted], self.target[fitted]
+        objective = Objective(*rows, evidence=evidence, device=self._device, dtype=self._dtype)
+        objective.share = share
+        if evidence:
+            return objective, None
+        return objective, Watch(objective, self.inputs[held], self.linear[held], self.target[held])

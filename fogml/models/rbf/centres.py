@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.models.threads import one_thread
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
+from fogml.arrays import FloatArray, IndexArray
+from fogml.processes import one_thread
 
 MOST_CANDIDATES = 5000
 """Rows among which centres are sought; more rows are thinned evenly."""

@@ -9,11 +9,9 @@ from math import factorial, log
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.signals.compiled import kernel
-
-FloatArray = NDArray[np.float64]
 
 _LANES = 256  # rows worked on at once: their buffers stay in the innermost cache
 _PART = 1 << 15  # rows given to a thread at once
@@ -113,7 +111,7 @@ def _basis(inputs, columns, centres, inverse, table, bias, shift, bits, out):  #
 
 def evaluate_network(
     inputs: FloatArray,
-    columns: NDArray[np.intp],
+    columns: IndexArray,
     centres: FloatArray,
     widths: FloatArray,
     weights: FloatArray,
@@ -167,7 +165,7 @@ def evaluate_network(
 
 def basis_functions(
     inputs: FloatArray,
-    columns: NDArray[np.intp],
+    columns: IndexArray,
     centres: FloatArray,
     widths: FloatArray,
     threads: int | None = None,

@@ -12,13 +12,12 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.models.parameters import check_parameters
-from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.network import Network, Solution, solve_network
+from fogml.models.rbf.rates import Edge
 from fogml.strict import Strict, strictly
-
-FloatArray = NDArray[np.float64]
 
 _ROUNDING_OF_NOISE = 1e-3
 # Greatest change by rounding to float32, as a share of the noise, for keeping float32.
@@ -179,7 +178,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
         self,
         inputs: FloatArray,
         target: FloatArray,
-        columns: NDArray[np.intp],
+        columns: IndexArray,
         centres: FloatArray,
         widths: FloatArray,
         edge: Edge | None = None,

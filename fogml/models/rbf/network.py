@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.models.arrays import expect_arrays
-from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.evaluate import basis_functions, evaluate_network
 from fogml.models.rbf.objective import LINEAR_PRECISION
+from fogml.models.rbf.rates import Edge
 from fogml.models.tall_least_squares import Part, condense
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 _PIECE = 1 << 13
 _NO_REACH = 1e-9

@@ -10,15 +10,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.models.rbf.together import joined
 
 if TYPE_CHECKING:
     import torch
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 # A step of the search may try a width of next to nothing.
 _NARROWEST = 300.0  # logarithm of one over its square

@@ -7,21 +7,19 @@ from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import validate_data
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.models.folds import dealt_folds
 from fogml.models.parameters import check_parameters
+from fogml.models.rbf.blocks import Frame
 from fogml.models.rbf.centres import orthogonal_least_squares, thinned, thinned_rows
 from fogml.models.rbf.evaluate import basis_functions
 from fogml.models.rbf.fitted import NetworkRegressor, SavedFit
-from fogml.models.rbf.levels import Frame
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
 
 WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Widths tried, in standard deviations of the inputs."""

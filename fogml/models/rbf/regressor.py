@@ -7,24 +7,22 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.models.parameters import Device, WholeNumbers, check_parameters
-from fogml.models.rbf.beyond import Edge
-from fogml.models.rbf.blocks import average_in_blocks
+from fogml.models.rbf.blocks import Frame, average_in_blocks
 from fogml.models.rbf.fitted import NetworkRegressor, SavedFit
-from fogml.models.rbf.levels import Frame
-from fogml.models.rbf.rates import RATES_THAT_TELL, followed_columns, restrained_inputs, training_rates
+from fogml.models.rbf.rates import RATES_THAT_TELL, Edge, followed_columns, restrained_inputs, training_rates
 from fogml.models.rbf.search import COARSE_ROWS, COARSE_ROWS_PER_CENTRE, Search, SearchSettings
 from fogml.models.rbf.tuning import TuningSettings
 
 if TYPE_CHECKING:
     from fogml.features.features import Features
 
-FloatArray = NDArray[np.float64]
 
 PRUNE_NATS = 1.1
 SIZES = (16, 32, 64)
@@ -251,7 +249,7 @@ class RBFRegressor(NetworkRegressor):
             "rounding_error": self.rounding_error_,
         }
 
-    def _seen(self, width: int) -> NDArray[np.intp]:
+    def _seen(self, width: int) -> IndexArray:
         """Indices of the network's inputs."""
         if self.network_inputs is None:
             return np.arange(width, dtype=np.intp)
@@ -260,7 +258,7 @@ class RBFRegressor(NetworkRegressor):
             raise InputError(f"network_inputs {list(self.network_inputs)}: there are inputs 0 to {width - 1}")
         return seen
 
-    def _edge(self, inputs: FloatArray, seen: NDArray[np.intp]) -> Edge:
+    def _edge(self, inputs: FloatArray, seen: IndexArray) -> Edge:
         """The trained range of the rates; none where the network sees none of them, being linear there."""
         wide = np.array([] if self.wide_inputs is None else self.wide_inputs, dtype=np.intp)
         return Edge.of(inputs, wide) if np.isin(seen, wide).any() else Edge.none()

@@ -7,13 +7,11 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.models.rbf.blocks import AveragedRows
+from fogml.arrays import FloatArray, IndexArray
+from fogml.models.rbf.blocks import AveragedRows, Frame, Level, Watch, held_out_rows
 from fogml.models.rbf.centres import kmeans_centres, ols_centres
-from fogml.models.rbf.levels import Frame, Level
 from fogml.models.rbf.objective import Shape
-from fogml.models.rbf.stopping import Watch, held_out_rows
 from fogml.models.rbf.together import joined
 from fogml.models.rbf.tuning import (
     LOG_WIDTH_RANGE,
@@ -22,10 +20,7 @@ from fogml.models.rbf.tuning import (
     SharedVariables,
     TuningSettings,
 )
-from fogml.models.threads import one_thread
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
+from fogml.processes import one_thread
 
 _LEAST_LOG_WIDTH = float(np.log(2.0))  # of shared widths along inputs that hold a rate
 _WIDE = 3.0  # wide widths start e^3 times wider

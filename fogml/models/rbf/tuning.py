@@ -11,11 +11,9 @@ from math import log
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import FloatArray
 from fogml.models.rbf.objective import Shape, Value
-
-FloatArray = NDArray[np.float64]
 
 Bounds = tuple[float | None, float | None]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.effect import ThermalEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.plant.network import ThermalNetwork as Network

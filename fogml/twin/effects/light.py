@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.effect import BiasEffect, ScaleFactorEffect, WhiteNoiseEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.optics import phase_noise_to_walk

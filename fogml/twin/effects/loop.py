@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.effect import LoopEffect, ReadoutEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import shared, signed, unsigned

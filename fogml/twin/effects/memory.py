@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.effect import BiasEffect, ScaleFactorEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory

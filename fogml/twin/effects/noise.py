@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.effect import NoiseEffect, WhiteNoiseEffect
 from fogml.twin.inputs import Inputs
-from fogml.twin.noise import URAD_S_IN_DEG_H
-from fogml.twin.quantities import shared, signed, unsigned
+from fogml.twin.noise import URAD_S_IN_DEG_H, amplitude_of
+from fogml.twin.quantities import shared, unsigned
 
 
 class Quantisation(NoiseEffect):
@@ -27,7 +27,7 @@ class Quantisation(NoiseEffect):
     id = "quantisation"
     code = "E1"
     title = "Quantisation"
-    amplitude = unsigned("urad", (0.05, 5.0), (5e-3, 0.5), "Q", 1e6)
+    amplitude = amplitude_of("Q")
     sources = ("IEEE Std 952-1997",)
     shows = "the Allan deviation at short times, with slope -1"
     shown_on = "rest for an hour"
@@ -60,7 +60,7 @@ class AngleRandomWalk(WhiteNoiseEffect):
     id = "angle_random_walk"
     code = "E2"
     title = "Angle random walk"
-    amplitude = unsigned("deg/sqrt(h)", (5e-3, 0.1), (2e-4, 3e-3), "N", 1e6)
+    amplitude = amplitude_of("N")
     conflicts = ("arw_physics",)
     sources = ("IEEE Std 952-1997",)
     shows = "the Allan deviation at middle times, with slope -1/2"
@@ -88,7 +88,7 @@ class BiasInstability(NoiseEffect):
     id = "bias_instability"
     code = "E3"
     title = "Bias instability"
-    amplitude = unsigned("deg/h", (0.05, 2.0), (5e-4, 1e-2), "B", 1e6)
+    amplitude = amplitude_of("B")
     sources = ("IEEE Std 952-1997",)
     shows = "the flat part of the Allan deviation"
     shown_on = "rest for an hour"
@@ -122,7 +122,7 @@ class RateRandomWalk(NoiseEffect):
     id = "rate_random_walk"
     code = "E4"
     title = "Rate random walk"
-    amplitude = unsigned("deg/h/sqrt(h)", (0.02, 1.0), (1e-4, 5e-3), "K", 1e6)
+    amplitude = amplitude_of("K")
     sources = ("IEEE Std 952-1997",)
     shows = "the Allan deviation at long times, with slope +1/2"
     shown_on = "rest for an hour"
@@ -161,7 +161,7 @@ class RateRamp(NoiseEffect):
     code = "E5"
     place = "electronics"
     title = "Rate ramp"
-    amplitude = signed("deg/h/h", (1e-3, 0.1), (1e-5, 1e-3), "R", 1e6)
+    amplitude = amplitude_of("R", signed=True)
     sources = ("IEEE Std 952-1997",)
     shows = "the Allan deviation at long times, with slope +1"
     confused_with = {

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.runs.facts import EARTH_RATE_DEG_H
-from fogml.runs.run import FloatArray
 from fogml.twin.effect import RigEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity, phase, shared, signed, unsigned

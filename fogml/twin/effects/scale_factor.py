@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.signals.waves import sine
 from fogml.twin.effect import ScaleFactorEffect
 from fogml.twin.inputs import Inputs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step, to_steps
 from fogml.signals.staircase import course_through_steps
 from fogml.twin.effect import SensorEffect

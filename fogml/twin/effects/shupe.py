@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.coil import LayeredCoil, lead_sensitivity, midpoint_sensitivity
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.attitude import UP, earth_field
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 from fogml.twin.plant.network import PlantState, ThermalNetwork
 from fogml.twin.quantities import Quantity, shared
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.memory import Memory
 from fogml.twin.plant.heat import ALWAYS_ON, PowerWindows
 from fogml.twin.plant.network import AIR, PlantState, ThermalNetwork

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.arrays import BoolArray, FloatArray
+from fogml.runs.run import Run
 from fogml.twin.plant.estimate import recorded_power
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.plant.network import AIR

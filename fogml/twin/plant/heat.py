@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 
 PowerWindows = tuple[tuple[float, float], ...]
 """When a unit is on: (from, to) [s] in time order, without overlap; infinite where long before or after."""

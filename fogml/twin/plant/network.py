@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
 from fogml.twin.plant.heat import ALWAYS_ON, Airflow, PowerWindows, SelfHeating, levels
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import erf
 
+from fogml.arrays import FloatArray
 from fogml.blind.first.recurrences import lag, recurrence
 from fogml.blind.frame.form import Additive, Demands, Shape
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import World
 
 _LEAD_DEG_H_PER_M = 0.525
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.first.recurrences import bouc_wen, lag, play
 from fogml.blind.frame.form import Additive, ScaleFactor, Shape
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import World
 
 _GAS_CONSTANT = 8.314
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Demands, Shape
 from fogml.blind.frame.operators import late
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import World
 from fogml.blind.second.memory import preisach
 
 

@@ -6,9 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Sensing, Shape
 from fogml.blind.frame.operators import late
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import World
 from fogml.blind.second.memory import backlash, slab_lag
 
 _OUTER = ("T_out", "T2", "T4")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import expit
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Demands, Shape
 from fogml.blind.frame.operators import late
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import World
 from fogml.blind.second.memory import backlash
 from fogml.blind.second.plant import AXIAL, RADIAL
 

@@ -7,9 +7,10 @@ from typing import ClassVar
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Sensing, Shape
 from fogml.blind.frame.operators import late
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import World
 
 _OUTER = ("T_out", "T2", "T4")
 

@@ -6,9 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Sensing, Shape
 from fogml.blind.frame.operators import late
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import World
 
 
 class Bistable(Additive):

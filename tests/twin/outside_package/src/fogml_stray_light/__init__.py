@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fogml.runs.run import FloatArray
+from fogml.arrays import FloatArray
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity

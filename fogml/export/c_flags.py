@@ -1,17 +1,56 @@
-"""The trained ranges at each temperature in C: constants, and the inputs that they are of."""
+"""What decides flags, as the constants of C code: what a thermometer can show, and trained ranges."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import ceil
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fogml.arrays import IntArray
 from fogml.escaping import c_text
 from fogml.export.plan import Plan
+from fogml.runs.dropouts import DropoutRule
+
+_CLOCK_US = 2**32 - 1
+"""Longest time that a 32-bit clock tells [us]."""
 
 
-def slice_inputs(plan: Plan, bits: NDArray[np.int64] | None = None) -> list[str]:
+def thermometer_rule(
+    rule: DropoutRule, number: Callable[[Any], str], readable_degC: float, step_degC: float | None = None
+) -> dict[str, str]:
+    """The templates' values of a rule.
+
+    Parameters
+    ----------
+    rule
+        What a thermometer can show.
+    number
+        How a number is written in C.
+    readable_degC
+        Furthest from 0 that a reading is taken.
+    step_degC
+        Temperatures are whole numbers of such steps; None where they are none.
+    """
+
+    def steps(value: float) -> float:
+        return value if step_degC is None else round(value / step_degC)
+
+    low, high = steps(max(rule.low_degC, -readable_degC)), steps(min(rule.high_degC, readable_degC))
+    rate = steps(rule.rate_degC_s)
+    return {
+        "low": number(low),
+        "high": number(high),
+        "jump": number(steps(rule.jump_degC)),
+        "rate": number(rate),
+        "continuing": number(steps(rule.continuing_degC)),
+        "spell_us": str(round(1e6 * rule.spell_s)),
+        "any_heat_us": str(min(ceil(1e6 * (high - low) / max(rate, 1e-6)), _CLOCK_US)),
+    }
+
+
+def slice_inputs(plan: Plan, bits: IntArray | None = None) -> list[str]:
     """Each input as an expression of atoms.
 
     Parameters
@@ -33,7 +72,7 @@ def slice_inputs(plan: Plan, bits: NDArray[np.int64] | None = None) -> list[str]
     return found
 
 
-def slice_numbers(plan: Plan, bits: NDArray[np.int64] | None = None) -> dict[str, Any]:
+def slice_numbers(plan: Plan, bits: IntArray | None = None) -> dict[str, Any]:
     """What the code holds: ``first``, ``width``, ``low`` and ``high``, the last two of shape (c, s)."""
     slices = plan.limits.slices
     assert slices is not None

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.signals.holds import hold_of
+from fogml.runs.noise_series import hold_of
 
 
 @pytest.mark.parametrize("samples", [2, 4, 10])

@@ -1,0 +1,277 @@
+"""The jobs of ``fogml lab`` on a rate table: misalignment, rate, north; and what all its jobs write."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fogml.cli.lab import WAYS, MisalignmentSettings, NorthSettings, RateSettings
+from fogml.cli.runs import open_run
+from fogml.cli.settings import Settings
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError, known_are
+from fogml.json_files import finite_json, write_json
+from fogml.lab.misalignment_input import read_measurements
+from fogml.lab.misalignment_json import misalignment_json
+from fogml.lab.north import Drift, Scheme, check_sense, horizontal_rate
+from fogml.lab.north_json import recorded_north_json, simulated_north_json
+from fogml.lab.rate_json import rate_json
+from fogml.lab.rate_tests import Criteria
+from fogml.lab.rate_words import result_rows
+from fogml.outputs import whole_folder
+from fogml.report.words import duration
+
+
+def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
+    """Find scale factor and misalignment, write them where a folder is named, and print them."""
+    if not settings.file:
+        raise InputError("no file is given; name the table of turns and rests")
+    file = settings.file
+
+    def make() -> dict[str, Any]:
+        with terminal.work(f"reading {file}"):
+            measured = read_measurements(file, settings.state_angles)
+            return finite_json(misalignment_json(measured, settings.cross_tilt))
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report import misalignment_page
+
+        return misalignment_page(values)
+
+    values = tell("misalignment", make, page, settings.in_full(), settings.out, terminal)
+    _print_misalignment(values, terminal)
+    terminal.result(values)
+    say_where("misalignment", settings.out, terminal)
+
+
+def _print_misalignment(values: dict[str, Any], terminal: Terminal) -> None:
+    se, intervals = values["se"], values["intervals"]
+    rows = [
+        [label, *_figures(values[key], se.get(key), intervals.get(key)), unit]
+        for label, key, unit in (
+            ("scale factor K", "K", values["unit"]),
+            ("delta x", "delta_x_deg", "deg"),
+            ("delta y", "delta_y_deg", "deg"),
+            ("delta", "delta_deg", "deg"),
+        )
+    ]
+    fixture_se = se.get("fixture_error_deg", [None, None])
+    for axis, value, error in zip("xy", values["fixture_error_deg"], fixture_se, strict=True):
+        rows.append([f"fixture error {axis}", *_figures(value, error, None), "deg"])
+    level = f"{values['level']:.0%}"
+    terminal.table(
+        f"{values['source']}: scale factor and misalignment, four states"
+        + (" (synthetic data)" if values["synthetic"] else ""),
+        ["quantity", "value", "standard error", f"{level} from", "to", "unit"],
+        rows,
+    )
+    rows = [
+        [
+            m["name"],
+            f"{m['K']:.9g}",
+            *(number(m[key]) for key in ("K_difference_ppm", "delta_x_deg", "delta_y_deg")),
+        ]
+        for m in values["methods"]
+    ]
+    header = ["method", f"K [{values['unit']}]", "K less four states [ppm]", "delta x [deg]", "delta y [deg]"]
+    terminal.table("Methods on the same turns", header, rows)
+    for note in values["notes"]:
+        terminal.say(note)
+
+
+def _figures(value: float, error: float | None, ends: list[float] | None) -> list[str]:
+    """Value, standard error and interval, to the first digit of the standard error."""
+    places = 6 if not error else max(-math.floor(math.log10(error)), 0)
+    told = [f"{end:.{places}f}" for end in ends] if ends else ["–", "–"]
+    return [f"{value:.{places}f}", "–" if error is None else f"{error:.2g}", *told]
+
+
+def tell(
+    name: str,
+    make: Callable[[], dict[str, Any]],
+    page: Callable[[dict[str, Any]], str],
+    settings: Settings,
+    out: str | None,
+    terminal: Terminal,
+    sheets: Callable[[dict[str, Any], Path], None] | None = None,
+) -> dict[str, Any]:
+    """Make the values and, where a folder is named, write ``name.json``, ``name.html`` and the settings.
+
+    `sheets` writes ``name.xlsx`` too.
+    """
+    if out is None:
+        return make()
+    with whole_folder(out) as folder:
+        values = make()
+        write_json(folder / f"{name}.json", values)
+        with terminal.work("drawing"):
+            (folder / f"{name}.html").write_text(page(values), encoding="utf-8")
+        if sheets is not None:
+            sheets(values, folder / f"{name}.xlsx")
+        settings.write_into(folder, f"lab {name}")
+    return values
+
+
+def say_where(name: str, out: str | None, terminal: Terminal) -> None:
+    """Say which page to open, where something was written."""
+    if out is not None:
+        terminal.say(f"Written to {out}: open {Path(out) / f'{name}.html'}")
+
+
+def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:
+    """Read the tests on a rate table, write them where a folder is named, and print them."""
+    if bool(settings.runs) == bool(settings.twin):
+        raise InputError("give recorded runs, or --twin to test a twin; one of the two")
+
+    def make() -> dict[str, Any]:
+        return finite_json(_values(settings, terminal))
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report.rate_page import rate_page
+
+        return rate_page(values)
+
+    values = tell("rate", make, page, settings.in_full(), settings.out, terminal)
+    _print_rate(values, terminal)
+    terminal.result(values)
+    say_where("rate", settings.out, terminal)
+
+
+def _values(settings: RateSettings, terminal: Terminal) -> dict[str, Any]:
+    criteria = Criteria(
+        answers=settings.answers,
+        dead=settings.dead,
+        range_error=settings.range_error,
+        small=settings.small,
+    )
+    if settings.twin is None:
+        with terminal.work("reading"):
+            runs = [open_run(path, repair=settings.repair) for path in settings.runs]
+        source = ", ".join(run.name for run in runs)
+        return rate_json(runs, source=source, settle_s=settings.settle, criteria=criteria)
+    from fogml.lab.rate_programmes import rate_runs
+    from fogml.twin.twin_file import load_twin
+
+    twin = load_twin(settings.twin)
+    with terminal.work(f"testing {twin.name}"):
+        runs = rate_runs(twin, greatest_deg_s=settings.greatest, noise=settings.noise, seed=settings.seed)
+        return rate_json(
+            runs, source=f"Twin {twin.name}", settle_s=settings.settle, criteria=criteria, twin=twin
+        )
+
+
+def _print_rate(values: dict[str, Any], terminal: Terminal) -> None:
+    rows = [[row.quantity, row.value, row.se, row.unit, row.remark] for row in result_rows(values, number)]
+    title = f"{values['source']}: tests on a rate table" + (
+        " (synthetic data)" if values["synthetic"] else ""
+    )
+    terminal.table(title, ["quantity", "value", "standard error", "unit", "remark"], rows)
+    for note in values["notes"]:
+        terminal.say(note)
+
+
+def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:
+    """Find north in a recorded run or in a simulation, write it where a folder is named, and print it."""
+    _check(settings)
+
+    def make() -> dict[str, Any]:
+        return finite_json(_recorded(settings, terminal) if settings.positions else _simulated(settings))
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report import north_page
+
+        return north_page(values)
+
+    values = tell("north", make, page, settings.in_full(), settings.out, terminal)
+    _print_north(values, terminal)
+    terminal.result(values)
+    say_where("north", settings.out, terminal)
+
+
+def _check(settings: NorthSettings) -> None:
+    check_sense(settings.sense)
+    if settings.positions and settings.azimuth is not None:
+        raise InputError("--positions and --azimuth: one is recorded, the other simulated; give one of them")
+    if settings.latitude is not None:
+        horizontal_rate(settings.latitude)
+    if settings.positions:
+        return
+    if settings.azimuth is None or settings.latitude is None:
+        raise InputError("give a run with --positions, or --azimuth and --latitude for a simulation")
+    if abs(settings.azimuth) > 1e6 or settings.azimuth != settings.azimuth:
+        raise InputError(f"azimuth {settings.azimuth:g} deg: a finite number is needed")
+    if not 0.0 <= settings.noise < float("inf"):
+        raise InputError(f"noise {settings.noise:g} deg/sqrt(h): a finite number, not negative, is needed")
+    if settings.way not in WAYS:
+        raise InputError(f"no way '{settings.way}'; {known_are(settings.way, WAYS)}")
+
+
+def _recorded(settings: NorthSettings, terminal: Terminal) -> dict[str, Any]:
+    assert settings.positions
+    with terminal.work(f"reading {settings.positions}"):
+        run = open_run(settings.positions, repair=settings.repair)
+    return recorded_north_json(
+        run,
+        sense=settings.sense,
+        order_deg=tuple(settings.order),
+        method=settings.method,
+        settle_s=settings.settle,
+        latitude_deg=settings.latitude,
+    )
+
+
+def _simulated(settings: NorthSettings) -> dict[str, Any]:
+    assert settings.azimuth is not None and settings.latitude is not None
+    scheme = Scheme(
+        tuple(settings.order), settings.sense, settings.dwell, settings.transfer, start_s=settings.start
+    )
+    return simulated_north_json(
+        scheme,
+        settings.azimuth,
+        settings.latitude,
+        Drift(settings.drift, tuple(settings.transients)),
+        way=settings.way,
+        coarse_dwell_s=settings.coarse,
+        random_walk_deg_sqrt_h=settings.noise,
+    )
+
+
+def _print_north(values: dict[str, Any], terminal: Terminal) -> None:
+    se = f" ± {number(values['se'])}" if values["se"] is not None else ""
+    if values["kind"] == "recorded":
+        terminal.say(f"{values['source']}: azimuth {values['azimuth_deg']:.5f}{se} deg ({values['method']})")
+        drift, drift_se = values["drift_deg_h_per_h"], values["drift_se"]
+        if drift is not None:
+            terminal.say(f"linear drift {number(drift)} ± {number(drift_se)} deg/h per h")
+            terminal.say(f"a plain seek is off by {number(values['error_deg'])} deg for it")
+    else:
+        terminal.say(
+            f"simulated at {values['true_azimuth_deg']:g} deg: found {values['azimuth_deg']:.5f}{se} deg "
+            f"({values['way']}), error {number(values['error_deg'])} deg"
+        )
+        rows = [
+            [
+                name,
+                *(
+                    number(told[key])
+                    for key in ("dwell_s", "error_deg", "greatest_error_deg", "rms_error_deg", "rms_se")
+                ),
+            ]
+            for name, told in values["ways"].items()
+        ]
+        header = [
+            "way",
+            "dwell [s]",
+            "error here [deg]",
+            "greatest [deg]",
+            "rms [deg]",
+            "se of noise, rms [deg]",
+        ]
+        terminal.table(f"Ways to spend {duration(values['duration_s'])}", header, rows)
+    azimuths = [", ".join(f"{a:.2f}" for a in values[f"{k}_azimuth_deg"]) for k in ("quiet", "worst")]
+    quiet, worst = (f"{told} deg" if told else "none" for told in azimuths)
+    terminal.say(f"quiet azimuths {quiet}; worst {worst}")
+    for note in values["notes"]:
+        terminal.say(note)

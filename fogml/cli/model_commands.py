@@ -1,0 +1,257 @@
+"""Settings of the commands on drift models: ``train``, ``compare``, ``compensate``, ``export``, ``sweep``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError
+
+from fogml.cli import options
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
+from fogml.errors import known_are, quoted
+from fogml.strict import first_fault
+from fogml.tracking import shown_tracker
+from fogml.tuning.space import Space
+
+
+class TrainSettings(options.LimitSettings):
+    """Fit a drift model on some runs and judge it on others.
+
+    Writes model/, report.json, report.html, report.xlsx and train.config.yaml; certificate.html where
+    limits are given. Exit status 1 if the design index or a limit is not met.
+    """
+
+    job: ClassVar[str] = "fogml.cli.train_job:train"
+    runs: options.Runs = []
+    test: options.Tests = []
+    model: options.Model = "auto"
+    features: options.Features = None
+    parameters: options.Parameters = {}
+    train_again: Annotated[
+        bool,
+        option(
+            "Search sizes and features on training folds until the design index is met there.",
+            "--train-again/--train-once",
+        ),
+    ] = False
+    from_diagnosis: Annotated[
+        str | None,
+        option(
+            "Compensate the causes that a diagnosis named: its folder; 'auto' is judged beside it.",
+            metavar="DIR",
+            reads=True,
+        ),
+    ] = None
+    causes: Annotated[
+        list[str],
+        option(
+            "With --from-diagnosis these causes in place of those named; may be repeated.",
+            "--cause",
+            metavar="EFFECT",
+            known=options.EFFECTS,
+        ),
+    ] = []
+    navigation: Annotated[
+        float | None, option("Show what the drift costs a navigator there.", metavar="LATITUDE")
+    ] = None
+    axis: options.Axis = None
+    repair: options.Repair = False
+    strict: options.Strict = False
+    any_unit: options.AnyUnit = False
+    out: options.Folder = "train-results"
+
+
+class CompareSettings(options.LimitSettings):
+    """Judge every model and baseline on the same split, in one table.
+
+    Writes compare.json, compare.html and compare.config.yaml. A model that can't be fitted to these runs is
+    reported with its reason. Exit status 1 if the design index or a limit is stated and no model
+    meets it.
+    """
+
+    job: ClassVar[str] = "fogml.cli.compare_job:compare_and_write"
+    runs: options.Runs = []
+    test: options.Tests = []
+    leave_one_out: Annotated[
+        bool,
+        option("Without --test: judge each run by models fitted on the others.", "--leave-one-out/--split"),
+    ] = False
+    models: Annotated[
+        list[str],
+        BeforeValidator(options.names_list),
+        option(
+            'Names with commas between, or "all".',
+            metavar="NAME,...",
+            as_text=True,
+            known="fogml.models.names:MODEL_NAMES",
+        ),
+    ] = ["all"]
+    features: options.Features = None
+    axis: options.Axis = None
+    repair: options.Repair = False
+    strict: options.Strict = False
+    any_unit: options.AnyUnit = False
+    out: options.Folder = "compare-results"
+
+
+class CompensateSettings(Settings):
+    """Apply a model to a run of any length, in bounded memory.
+
+    The file written holds the run's columns and 'drift [deg/h]', 'gyro_compensated [deg/h]' and
+    'flag': 0 good, 1 outside what the model was trained on, 2 a window not full (there the static part) or a
+    memory not settled (there what the run tells of it).
+    """
+
+    job: ClassVar[str] = "fogml.cli.compensate_job:compensate_and_write"
+    run: Annotated[
+        str | None,
+        argument("RUN", "The run to compensate.", reads=True, known=options.SHIPPED_RUNS),
+    ] = None
+    model: Annotated[
+        str | None, option("Folder of the model, or of the results that hold it.", metavar="DIR", reads=True)
+    ] = None
+    any_unit: options.AnyUnit = False
+    axis: options.Axis = None
+    repair: options.Repair = False
+    out: options.FileToWrite = None
+
+
+def _several(value: object) -> object:
+    return [value] if isinstance(value, str) else value
+
+
+def _one_as_text(value: list[str]) -> str | list[str]:
+    return value[0] if len(value) == 1 else value
+
+
+class ExportJobSettings(Settings):
+    """Write a model's compact form, once it has been compared with the model.
+
+    Writes fogml_model.* and export.json. C code takes raw temperatures sample by sample; it is
+    compiled and run against the model before it is written. Exit status 2, and nothing written, if
+    it differs by more than the tolerance.
+
+    Segments are a table of bias and scale factor over one temperature (CSV, JSON, C); px4 and
+    ardupilot are parameter files with a cubic. Both hold what the model says at rest.
+    """
+
+    job: ClassVar[str] = "fogml.cli.export_job:export_and_write"
+    model: Annotated[
+        list[str],
+        BeforeValidator(_several),
+        PlainSerializer(_one_as_text),
+        argument("MODEL...", "Folder of the model, or of the results of three axes.", reads=True),
+    ] = []
+    to: Annotated[
+        str,
+        option(
+            "c, onnx, json, mat; segments, px4 or ardupilot.",
+            metavar="FORMAT",
+            known=("c", "onnx", "json", "mat", "segments", "px4", "ardupilot"),
+        ),
+    ] = "c"
+    dtype: Annotated[
+        str | None,
+        option(
+            "float64, float32, float16, int8, q15 or q31.",
+            metavar="TYPE",
+            known=("float64", "float32", "float16", "int8", "q15", "q31"),
+        ),
+    ] = None
+    bytes: Annotated[int | None, option("Leave out centres until the weights fit N bytes.")] = None
+    with_pipeline: Annotated[
+        bool, option("ONNX from the temperatures' window.", "--with-pipeline/--features-only")
+    ] = False
+    tolerance: Annotated[
+        float | None, option("Largest difference from the model allowed.", metavar="DEG/H")
+    ] = None
+    sample_s: Annotated[
+        float | None, option("Sample interval on board; that of training if none.", metavar="SECONDS")
+    ] = None
+    breakpoints: Annotated[
+        int | None, option("Of segments; as few as the tolerance allows.", metavar="K")
+    ] = None
+    matrix: Annotated[
+        str | None,
+        option("3 x 3 matrix (YAML) that three axes are multiplied by.", metavar="FILE", reads=True),
+    ] = None
+    train: Annotated[
+        list[str],
+        option(
+            "The model's training runs, to prune and to judge on.",
+            metavar="RUN...",
+            spread=True,
+            reads=True,
+            known=options.SHIPPED_RUNS,
+        ),
+    ] = []
+    out: options.Folder = "export-results"
+
+
+def _understood(value: Any) -> Space:
+    """The space; a fault names its place."""
+    try:
+        return value if isinstance(value, Space) else Space.model_validate(value)
+    except ValidationError as error:
+        first = first_fault(error)
+        if first["type"] == "missing":
+            raise ValueError(f"nothing is given for '{first['loc'][-1]}'") from None
+        if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
+            key = str(first["loc"][0])
+            known = known_are(key, Space.model_fields, "known keys")
+            raise ValueError(f"unknown key {quoted(key)}; {known}") from None
+        place = ".".join(str(part) for part in first["loc"] if str(part) not in ("Range", "list[float]"))
+        reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
+        raise ValueError(f"{place}: {reason}" if place else reason) from None
+
+
+class SweepSettings(Settings):
+    """Search features, models and sizes on held-out parts of the training runs.
+
+    The same command goes on with a study that was interrupted, and with --storage joins it from
+    another machine. Writes best.yaml (a configuration of fogml train), sweep.json, sweep.html and
+    sweep.config.yaml; the study itself is kept in --out unless --storage names a database.
+    """
+
+    job: ClassVar[str] = "fogml.cli.sweep_job:sweep_and_write"
+    config_argument: ClassVar[str] = "YAML file of schema fogml.sweep/1."
+    needed_keys: ClassVar[tuple[str, ...]] = ("runs",)
+    schema_: Literal["fogml.sweep/1"] = Field("fogml.sweep/1", alias="schema")
+    name: Annotated[str, option("Name of the study in its storage.", metavar="NAME")] = "sweep"
+    runs: Annotated[
+        list[str],
+        option(
+            "Training run; may be repeated.",
+            "--run",
+            metavar="RUN",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+        ),
+    ] = []
+    test: options.Tests = []
+    space: Annotated[Space, BeforeValidator(_understood)]
+    objectives: Annotated[list[str], BeforeValidator(options.names_list)] = ["rms"]
+    folds: Literal["auto", "time", "runs"] = "auto"
+    fold_count: int = 5
+    trials: Annotated[int, option("Trials to finish.")] = 50
+    sampler: str = "tpe"
+    prune: bool = True
+    workers: options.Workers = 1
+    storage: Annotated[
+        str | None, option("Database of the study, e.g. postgresql://user@host/db.", metavar="URL")
+    ] = None
+    heartbeat_s: float = 10.0
+    track: options.Track = None
+    averaging: options.Averaging = 100.0
+    repair: options.Repair = False
+    out: options.Folder = "sweep-results"
+
+    def as_written(self) -> dict[str, Any]:
+        """The values of a configuration file; a password is never written."""
+        from fogml.databases import without_password
+
+        values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
+        if self.track is not None:
+            values["track"] = shown_tracker(self.track)
+        return values if self.storage is None else {**values, "storage": without_password(self.storage)}

@@ -1,0 +1,135 @@
+"""Settings of the commands on runs (``demo``, ``import``, ``inspect``, ``noise``), ``app``, ``docs``."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from fogml.cli import options
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
+
+
+class DemoSettings(Settings):
+    """Train and judge on a real recording that ships, then say what to open.
+
+    Trains on the up leg of a chamber cycle and judges on the last down leg, three axes. Writes
+    x/, y/ and z/, each as 'train' does, and index.html.
+    """
+
+    job: ClassVar[str] = "fogml.cli.demo_job:demo_and_write"
+    out: options.Folder = "demo-results"
+
+
+class ImportSettings(Settings):
+    """Bring a logger's file into the run format, or draft a profile for it.
+
+    Writes one run for each leg and axis, STEM[-LEG][-AXIS].csv, with its side file; with --repair one for
+    each restart of the clock. With --draft, --out names the profile to write.
+    """
+
+    job: ClassVar[str] = "fogml.cli.import_job:import_and_write"
+    file: Annotated[str | None, argument("FILE", "The logger's file.", reads=True)] = None
+    profile: Annotated[
+        str | None,
+        option(
+            "Name of a profile that ships, or a YAML file.",
+            metavar="NAME|FILE",
+            reads=True,
+            known="fogml.runs.profile_schema:profile_names",
+        ),
+    ] = None
+    axis: Annotated[str | None, option("One axis of the profile; all if none.", metavar="AXIS")] = None
+    draft: Annotated[
+        bool,
+        option(
+            "Write a profile with guesses into the file that --out names, or print it; show the first rows "
+            "as it reads them."
+        ),
+    ] = False
+    repair: options.Repair = False
+    out: options.FolderIfNamed = None
+
+
+class InspectSettings(Settings):
+    """Say what is in a run: columns, span, gaps, soaks and ramps, faults.
+
+    With --out, writes inspect.json, inspect.html and inspect.config.yaml.
+    """
+
+    job: ClassVar[str] = "fogml.cli.inspect_job:inspect_and_write"
+    runs: Annotated[
+        list[str], argument("RUN...", "Runs to look into.", reads=True, known=options.SHIPPED_RUNS)
+    ] = []
+    axis: options.Axis = None
+    repair: options.Repair = False
+    strict: options.Strict = False
+    out: options.FolderIfNamed = None
+
+
+class NoiseSettings(Settings):
+    """Allan deviation and the IEEE 952 noise terms with intervals.
+
+    With --out, writes noise.json, noise.html and noise.config.yaml; with --to the terms for another program
+    too: noise.kalibr.yaml, noise_gyroparams.m (MATLAB), or noise.kalman.json (discrete-time Q).
+    """
+
+    job: ClassVar[str] = "fogml.cli.noise_job:noise_and_write"
+    run: Annotated[
+        str | list[str] | None,
+        argument(
+            "RUN...",
+            "A run, best at constant temperature; several share their terms.",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+        ),
+    ] = None
+    overlapping: Annotated[bool, option("Kind of estimator.", "--overlapping/--not-overlapping")] = True
+    to: Annotated[
+        str | None,
+        option(
+            "Write the terms for another program.",
+            metavar="kalibr|matlab|kalman",
+            known="fogml.export.noise_parameters:TARGETS",
+        ),
+    ] = None
+    axis: options.Axis = None
+    repair: options.Repair = False
+    out: options.FolderIfNamed = None
+
+
+class AppSettings(Settings):
+    """A page on this machine: drop files, choose, train, judge, diagnose, export.
+
+    Prints the page's address, with a token that opens it; nobody on another machine reaches it. Files and
+    jobs lie in FOLDER. A job is a command line of fogml, shown beside the form. It goes on when page or
+    server end, and the next fogml app of the folder finds it again.
+    """
+
+    job: ClassVar[str] = "fogml.cli.app_job:serve"
+    folder: Annotated[str, argument("[FOLDER]", "Where files and jobs lie.", writes=True)] = "fogml-app"
+    port: Annotated[int, option("Port of the address; 0 for any that is free.")] = Field(8765, ge=0, le=65535)
+    jobs: Annotated[int, option("Jobs that run at a time; others wait.")] = Field(1, ge=1)
+    upload_limit: Annotated[float, option("Greatest size of a file.", metavar="MB")] = Field(2000.0, gt=0.0)
+    idle: Annotated[
+        float | None,
+        option("End once no page has asked for so long and no job runs; never if none.", metavar="SECONDS"),
+    ] = Field(None, gt=0.0)
+    browser: Annotated[bool, option("Open the page in the browser.", "--browser/--no-browser")] = False
+
+
+class DocsSettings(Settings):
+    """The documentation, without a network: list, read, or write as one page.
+
+    Without PAGE lists the pages; with PAGE prints it; with --out writes every page into one HTML file that
+    loads nothing from elsewhere.
+    """
+
+    job: ClassVar[str] = "fogml.cli.docs_job:show_docs"
+    page: Annotated[
+        str | None, argument("[PAGE]", "A page to print here.", known="fogml.report.manual:page_names")
+    ] = None
+    out: Annotated[
+        str | None, option("File to write: .html.", "--out", "-o", metavar="FILE", writes=True)
+    ] = None
