@@ -67,7 +67,7 @@ def check_finite(values: Any, name: str) -> None:
         raise InputError(f"{name}: '{place}' comes out as {number}, which is no result; {FAR_OFF}")
 
 
-def finite_json(values: Any, name: str = "result") -> Any:
+def finite_json(values: Any) -> Any:
     """Values with numpy's scalars and arrays as Python's, tuples as lists, and NaN, no value, as None.
 
     Raises
@@ -76,7 +76,7 @@ def finite_json(values: Any, name: str = "result") -> Any:
         If a number is infinite, naming its key.
     """
     plain = _plain(values)
-    check_finite(plain, name)
+    check_finite(plain, "result")
     return plain
 
 

@@ -87,7 +87,7 @@ class Pictured:
         return figure
 
 
-def in_time(time_s: object, values: object, label: str, colour: str, dash: str = "") -> Curve:
+def in_time(time_s: object, values: object, label: str, colour: str) -> Curve:
     """A curve over time [h], with as many points as a picture shows."""
     time, shown = drawn(time_s, values, _POINTS)  # type: ignore[arg-type]
-    return Curve(time / 3600.0, shown, colour, dash, label=label)
+    return Curve(time / 3600.0, shown, colour, label=label)

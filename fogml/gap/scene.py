@@ -198,9 +198,9 @@ class Family:
     largest: float = math.inf
 
 
-def column_block(*columns: FloatArray, weight: float = 1.0, positive: bool = False, **shape: Any) -> Block:
+def column_block(*columns: FloatArray, positive: bool = False, **shape: Any) -> Block:
     """A block of columns of shape (m,) each."""
-    return Block(np.column_stack(columns), shape, weight, positive)
+    return Block(np.column_stack(columns), shape, positive=positive)
 
 
 def steps_are_coarse(scene: Scene, twin: Twin) -> bool:

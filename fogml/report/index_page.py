@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,7 +37,6 @@ def index_page(
     *,
     title: str = "Demonstration",
     beside: Mapping[str, Mapping[str, Judgement]] | None = None,
-    notes: Sequence[str] = (),
 ) -> str:
     """The self-contained HTML page that leads to one page per axis.
 
@@ -51,8 +50,6 @@ def index_page(
         Heading.
     beside
         Name of another model to its judgements by axis, on the same runs; shown in the table.
-    notes
-        What the page should say of the recording.
     """
     links = links or {axis: f"{axis}/report.html" for axis in judgements}
     found = {axis: _loop(judgement) for axis, judgement in judgements.items()}
@@ -72,7 +69,7 @@ def index_page(
         ],
         table=_table(judgements, beside or {}, found),
         drawing=loops(judgements),
-        notes=[*notes, *told],
+        notes=list(told),
     )
 
 

@@ -208,7 +208,7 @@ def segments_of(time: ArrayLike, regime: NDArray[np.str_]) -> list[Segment]:
     return [(str(name), float(a), float(b)) for name, a, b in zip(names, begins, ends, strict=True)]
 
 
-def shade(figure: go.Figure, segments: Sequence[Segment], xref: str = "x") -> list[str]:
+def shade(figure: go.Figure, segments: Sequence[Segment]) -> list[str]:
     """Draw bands over the whole height of a figure; the names of the regimes that were drawn.
 
     Bands too narrow to be seen are left out, and of very many only the widest are drawn, so
@@ -228,7 +228,7 @@ def shade(figure: go.Figure, segments: Sequence[Segment], xref: str = "x") -> li
             layer="below",
             line_width=0,
             fillcolor=tint,
-            xref=xref,
+            xref="x",
             yref="paper",
             x0=start,
             x1=stop,
@@ -239,7 +239,7 @@ def shade(figure: go.Figure, segments: Sequence[Segment], xref: str = "x") -> li
             figure.add_annotation(
                 text=regime_word(name),
                 showarrow=False,
-                xref=xref,
+                xref="x",
                 yref="paper",
                 x=0.5 * (start + stop),
                 y=1.0,

@@ -124,7 +124,7 @@ class Regression:
         k = self.constants.shape[1]
         return Fit(found[:k], found[k:], se[k:], rest)
 
-    def prediction(self, runs: Stack, chosen: Sequence[Atom], added: FloatArray | None = None) -> Prediction:
+    def prediction(self, runs: Stack, chosen: Sequence[Atom]) -> Prediction:
         """The recalibrated twin and the fitted model with some atoms, on some runs.
 
         Parameters
@@ -133,8 +133,6 @@ class Regression:
             Fit or held-out runs.
         chosen
             Atoms of the model.
-        added
-            Something else that the model adds [deg/h], shape (n,).
         """
         nothing = self.fit(np.zeros((len(self.target), 0)))
         fitted = nothing
@@ -144,7 +142,7 @@ class Regression:
         after = runs.nominal @ fitted.constants if self.free else np.zeros(len(runs))
         for atom, amplitude in zip(chosen, fitted.amplitudes):
             after = after + amplitude * runs.column(atom)
-        return Prediction(runs, recalibrated, after if added is None else after + added)
+        return Prediction(runs, recalibrated, after)
 
     @cached_property
     def held_out(self) -> Stack:

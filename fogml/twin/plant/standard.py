@@ -73,9 +73,7 @@ QUANTITIES: tuple[Quantity, ...] = (
 LARGEST_ORDER = 64
 
 
-def standard_network(
-    constants: ThermalConstants | None = None, order: int = 6, coil_nodes: int | None = None
-) -> ThermalNetwork:
+def standard_network(constants: ThermalConstants | None = None, order: int = 6) -> ThermalNetwork:
     """The network chamber air -> case -> coil outer face -> inner face -> hub, with electronics and plate.
 
     Parameters
@@ -86,8 +84,6 @@ def standard_network(
         Number of nodes. 1: the unit as a whole; 2: case, coil; 3: case, outer and inner face; 4:
         and electronics; 5: and hub; 6: and table plate; above: ``order - 4`` nodes in the coil.
         What has no node of its own is part of its neighbour, which is read in its place.
-    coil_nodes
-        Nodes from the outer to the inner face, both included; for order 3 and above.
 
     Returns
     -------
@@ -110,10 +106,7 @@ def standard_network(
     c = ThermalConstants() if constants is None else constants
     if not 1 <= order <= LARGEST_ORDER:
         raise InputError(f"thermal plant: order is {order}; it lies between 1 and {LARGEST_ORDER}")
-    coil_nodes = max(2, order - 4) if coil_nodes is None else coil_nodes
-    if coil_nodes < 2:
-        raise InputError(f"thermal plant: coil_nodes is {coil_nodes}; the two faces need 2")
-    network = _full(c, coil_nodes, order)
+    network = _full(c, max(2, order - 4), order)
     if order < 6:
         capacities = {name: value for name, value in network.capacities.items() if name != "T_plate"}
         links = {pair: value for pair, value in network.links.items() if "T_plate" not in pair}
