@@ -78,6 +78,18 @@ def test_a_job_whose_processes_are_gone_has_failed(tmp_path: Path) -> None:
     until("failed", jobs, name)
 
 
+def test_runs_to_choose_from_are_those_that_were_imported(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path, 1)
+    for name, words in (("0001", ["import", "log.txt"]), ("0002", ["compensate", "import"]), ("0003", [])):
+        results = tmp_path / "jobs" / name / "results"
+        results.mkdir(parents=True)
+        (results / "run.csv").write_text("time [s]\n0\n")
+        (results.parent / "job.json").write_text(json.dumps({"words": words, "made": ""}))
+    assert jobs.runs() == [
+        {"name": path, "path": path, "bytes": 11, "run": True} for path in ["jobs/0001/results/run.csv"]
+    ]
+
+
 def test_a_refused_command_says_why(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path, 1)
     name = jobs.add(lambda results: ["inspect", "files/none.csv", "--out", results])

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from fogml.blind.baselines.forward import bic, bic_fixed_nominal
-from fogml.blind.baselines.learners import abstain
+from fogml.blind.baselines.learners import abstain, gp_discrepancy
 from fogml.blind.baselines.oracle import oracle
 from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.methods import METHODS, load_method
@@ -67,6 +67,18 @@ def test_forward_selection_finds_an_effect_of_the_twin_itself(suite: BlindFolder
 def test_constants_held_fixed_name_what_is_not_there(suite: BlindFolder, tmp_path: Path) -> None:
     bic_fixed_nominal(case_files(suite.cases / "0001"), tmp_path)
     assert named(json.loads((tmp_path / "gap.json").read_text()))
+
+
+def test_a_process_over_the_twin_says_unknown_where_there_is_more_than_noise(
+    suite: BlindFolder, tmp_path: Path
+) -> None:
+    for name, missing in (("0001", False), ("0003", True)):
+        out = tmp_path / name
+        out.mkdir()
+        gp_discrepancy(case_files(suite.cases / name), out, most_rows=120)
+        gap = json.loads((out / "gap.json").read_text())
+        assert named(gap) == []
+        assert (gap["unknown"]["probability"] > 0.99) is missing, gap["unknown"]
 
 
 def test_left_out_is_not_offered(suite: BlindFolder) -> None:

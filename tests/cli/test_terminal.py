@@ -120,6 +120,17 @@ def test_a_bar_cuts_the_description_and_not_the_times(monkeypatch) -> None:
     assert re.search(r"0:00:0\d left: 0:00:00", last)
 
 
+def test_a_line_of_a_log_tells_the_time_left(monkeypatch, capsys) -> None:
+    clock = iter([0.0, 100.0, 101.0, 300.0])
+    monkeypatch.setattr("fogml.cli.terminal.time.monotonic", lambda: next(clock))
+    with Terminal().work("reading", total=4.0) as work:
+        work.advance()
+        work.advance()  # too soon for another line
+        work.advance()
+    told = capsys.readouterr().err.splitlines()
+    assert told == ["reading: 25%, about 0:05:00 left", "reading: 75%, about 0:01:40 left"]
+
+
 def test_a_note_stands_on_a_line_of_its_own_above_the_bar(monkeypatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(sys, "stderr", screen := _Screen())
