@@ -40,7 +40,7 @@ DEFAULT_COLUMNS = (
 )
 """What is recorded beside time and gyro unless told otherwise."""
 DEFAULT_FACTS = Facts(axis="x", latitude=39.9, input_axis="up")
-BLOCK_ROWS = 1 << 16
+BLOCK_ROWS = 3 << 14
 """Samples worked out at once: many enough that two threads seldom wait for each other's turn."""
 _NO_SENSOR = ("time", "gyro", REPLAYED)
 _ROUNDED = 1e-6
