@@ -95,7 +95,8 @@ def test_yield_distribution_and_order(folders, tmp_path):
     assert 1.0 - high**9 == pytest.approx(0.05)
     (bias,) = values["quantities"]
     sizes = np.abs([0.01, -0.02, 0.03, 0.09, 0.0, 0.02, 0.01, -0.01, 0.04])
-    assert bias["distribution"]["median"] == pytest.approx(np.median(sizes))
+    shares = {"least": 0, "q10": 10, "median": 50, "q90": 90, "largest": 100}
+    assert bias["distribution"] == pytest.approx({k: np.percentile(sizes, v) for k, v in shares.items()})
     assert (bias["over"], bias["tested"], bias["limit"]) == (1, 9, LIMIT)
     names = [unit["serial_number"][-4:] for unit in values["units"]]
     assert names[:2] == ["0004", "0008"] and names[2:] == sorted(names[2:])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fogml.runs.steps import recorded_step, to_steps
+from fogml.runs.steps import reading_noise, recorded_step, to_steps
 
 READINGS = st.floats(-60.0, 90.0)
 
@@ -34,3 +34,10 @@ def test_any_other_step_is_a_multiple_too(reading: float, step: float):
 def test_the_step_is_found_again():
     readings = to_steps(np.linspace(20.0, 31.0, 700), 0.01)
     assert recorded_step(readings) == pytest.approx(0.01)
+
+
+def test_noise_of_readings_is_that_of_white_noise_on_a_ramp():
+    noise = np.random.default_rng(2).standard_normal(40_000)
+    assert reading_noise(np.linspace(-40.0, 60.0, 40_000) + 0.02 * noise) == pytest.approx(0.02, rel=0.02)
+    # Of steps wider than the noise the step tells: its width over the root of 12.
+    assert reading_noise(to_steps(np.linspace(20.0, 30.0, 40_000), 0.1)) == pytest.approx(0.1 / 12**0.5)

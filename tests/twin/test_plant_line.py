@@ -79,6 +79,10 @@ def test_in_a_network_the_faces_are_apart_as_conduction_says() -> None:
     assert sum(network.capacities.values()) == pytest.approx(
         sum(standard_network(constants).capacities.values()), rel=1e-12
     )
+    # The faces carry a thousandth of the layer beside them.
+    layers = line(64).between_faces(constants.coil_capacity).capacities
+    for face, layer in (("T_out", line(64).names[-1]), ("T_in", line(64).names[0])):
+        assert network.capacities[face] == pytest.approx(1e-3 * layers[layer])
     # What is outside the coil notices nothing in a steady ramp.
     assert lags["T_case"] == pytest.approx(900.0)
     assert lags["T_out"] == pytest.approx(1260.0, rel=1e-9)

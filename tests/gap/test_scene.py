@@ -1,0 +1,34 @@
+"""When the runs of a diagnosis began, by their facts or one after the other."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fogml.gap.scene import Scene
+
+
+def rows(first_s: float, span_s: float, row_s: float, started: datetime | None) -> SimpleNamespace:
+    run = SimpleNamespace(span_s=span_s, time=np.array([first_s]), facts=SimpleNamespace(started=started))
+    return SimpleNamespace(run=run, row_s=row_s)
+
+
+def begun(*runs: SimpleNamespace) -> Any:
+    return Scene.__dict__["begun_s"].func(SimpleNamespace(runs=runs))
+
+
+def test_runs_of_unknown_start_come_one_after_the_other() -> None:
+    day = datetime(2026, 3, 1, tzinfo=UTC)
+    runs = [rows(0.0, 990.0, 10.0, day), rows(50.0, 480.0, 20.0, None), rows(0.0, 100.0, 10.0, None)]
+    # Each lasts a row longer than from its first to its last; the second clock shows 50 s when it begins.
+    assert begun(*runs) == pytest.approx((0.0, 950.0, 1500.0))
+
+
+def test_runs_of_known_start_lie_as_stated() -> None:
+    day = datetime(2026, 3, 1, tzinfo=UTC)
+    runs = [rows(0.0, 990.0, 10.0, day + timedelta(hours=h)) for h in (5.0, 0.0, 30.0)]
+    assert begun(*runs) == pytest.approx((18_000.0, 0.0, 108_000.0))
