@@ -35,7 +35,7 @@ def page_of(rows: Sequence[Mapping[str, Any]], drawn: int, seed: int, explained:
         f"Of {drawn} changes drawn over all code (seed {seed}), {len(rows)} were tried. "
         f"Noticed: {_share(noticed, len(rows))}. "
         f"Noticed, or explained below: {_share(noticed + len(equal), len(rows))}. "
-        "Intervals are Wilson's of 95 %.",
+        "Intervals are Wilson's of 95 %. Files are named as in the state that was tried.",
         "",
         "| package | tried | noticed | explained | left |",
         "|---|---|---|---|---|",
