@@ -45,6 +45,8 @@ _HALVES = {"hour": "h", "hr": "h", "hrs": "h", "second": "s", "sec": "s", "degre
 _PLAIN_UNIT = re.compile(r"[A-Za-z_]{1,20}(/[A-Za-z_]{1,20})?\Z")
 # What pint calls the units that the run format writes otherwise.
 _OF_PINT = {"g": "standard_gravity", "G": "gauss", "%": "percent", "degC": "degree_Celsius", "h": "hour"}
+# Nobody counts in hundreds of hours: deg/hh, which pint takes for that, is a slip.
+_MULTIPLE_OF_TIME = re.compile(r"(?!arc)[a-z]+(hour|minute|day|week|month|year)\Z")
 _ANGLE = re.compile(r"[a-z]*(degree|radian|arcminute|arcsecond|turn|grade)\Z")
 
 
@@ -87,7 +89,7 @@ def converted(unit: str, internal: str) -> tuple[float, float] | None:
     registry = _registry()
     try:
         source, target = (registry.Unit(_OF_PINT.get(u, u)) for u in (plain, internal))
-        if _has_angle(source) != _has_angle(target):
+        if _has_angle(source) != _has_angle(target) or _matches(source, _MULTIPLE_OF_TIME):
             return None
         zero, one = (float(registry.Quantity(value, source).to(target).magnitude) for value in (0.0, 1.0))
     except Exception:  # pint raises errors of many kinds for what is no unit
@@ -96,7 +98,11 @@ def converted(unit: str, internal: str) -> tuple[float, float] | None:
 
 
 def _has_angle(unit: Any) -> bool:
-    return any(_ANGLE.match(name) for name, _ in (1.0 * unit).unit_items())
+    return _matches(unit, _ANGLE)
+
+
+def _matches(unit: Any, names: re.Pattern[str]) -> bool:
+    return any(names.match(name) for name, _ in (1.0 * unit).unit_items())
 
 
 @cache
