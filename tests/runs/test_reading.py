@@ -227,7 +227,7 @@ class TestFacts:
             ("- a\n- b", "key: value"),
             ("unit: [", "line 1.*YAML|YAML"),
             ("unit: a\naxis: x\nunit: b", "line 3.*'unit'.*twice"),
-            ("[" * 5000, "more than 32 levels"),
+            ("[" * 5000, "more than 32 levels|maximum nesting depth"),
             ("1: 2", "'1'"),
         ],
     )
