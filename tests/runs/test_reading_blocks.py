@@ -72,6 +72,8 @@ def peak_bytes(path, block_rows: int) -> int:
     tracemalloc.start()
     reader = reader_process.ReaderProcess()
     reader_process._processes.process, reader_process._processes.owner = reader, os.getpid()
+    # Once it answers it has loaded what it needs, however soon the file is read.
+    assert reader.ask({"do": "close", "file": -1, "cpu_s": 60.0}, None, 60.0) is not None
     try:
         rows = sum(len(block) for block in read_blocks(path, block_rows=block_rows))
         assert rows > 0
