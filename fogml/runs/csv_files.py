@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,8 +22,7 @@ from fogml.runs.stamps import StampClock
 if TYPE_CHECKING:
     from pyarrow import RecordBatch, Table
 
-_BLANK_BYTES = 64
-"""Of a part that are looked at first for anything but blanks."""
+_NO_BLANK = re.compile(rb"\S")
 
 
 def read_csv(path: Path, *, repair: bool) -> RawTable:
@@ -41,7 +41,7 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
     dialect, notes = without_footer(csv_dialect(path))
     try:
         if not all(quotes_are_plain(part, dialect.separator) for part in dialect.source.whole_lines()):
-            raise _other_quotes()
+            raise _for_line_by_line("quotation marks that the fast parser reads otherwise")
         table = arrow_csv.read_csv(_opened(dialect), **_options(dialect, dialect.skipped_lines))
         clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
         whole = _raw(path, dialect, table, 0, clock)
@@ -108,11 +108,11 @@ def _opened(dialect: CsvDialect) -> Any:
     return dialect.source.path if dialect.source.is_plain else dialect.source.open()
 
 
-def _other_quotes() -> Exception:
-    """Leaves a file to the exact reader where the fast one would read its quotation marks otherwise."""
+def _for_line_by_line(reason: str) -> Exception:
+    """Leaves a file to the exact reader, which tells where the fault is or reads it after all."""
     import pyarrow as arrow
 
-    error: Exception = arrow.ArrowInvalid("quotation marks")
+    error: Exception = arrow.ArrowInvalid(reason)
     return error
 
 
@@ -124,8 +124,8 @@ def _batches(dialect: CsvDialect) -> Iterator[RecordBatch]:
     source, skipped = dialect.source, dialect.skipped_lines
     for part in source.whole_lines():
         if not quotes_are_plain(part, dialect.separator):
-            raise _other_quotes()
-        if len(part) and not (bytes(part[:_BLANK_BYTES]).isspace() and bytes(part).isspace()):
+            raise _for_line_by_line("quotation marks that the fast parser reads otherwise")
+        if _NO_BLANK.search(part):
             options = _options(dialect, skipped)
             yield from arrow_csv.read_csv(arrow.BufferReader(part), **options).to_batches()
             skipped = 0
@@ -181,8 +181,7 @@ def _raw(path: Path, dialect: CsvDialect, table: Table, start: int, clock: Stamp
         texts = [table.column(str(i)).combine_chunks() for i in dialect.stamp_places]
         columns[dialect.time_cell] = clock.seconds(texts)
         if np.isnan(columns[dialect.time_cell]).any():
-            # Line by line tells where the stamp is that is none.
-            raise _no_stamp()
+            raise _for_line_by_line("a time that is no stamp of the first one's form")
     return RawTable(
         path.name,
         dialect.cells,
@@ -191,13 +190,6 @@ def _raw(path: Path, dialect: CsvDialect, table: Table, start: int, clock: Stamp
         findings=tuple(text_column(dialect.name(i)) for i in sorted(dialect.text)),
         started=dialect.stamps.started if dialect.stamps else None,
     )
-
-
-def _no_stamp() -> Exception:
-    import pyarrow as arrow
-
-    error: Exception = arrow.ArrowInvalid("a time that is no stamp of the first one's form")
-    return error
 
 
 def _unreadable(path: Path, error: OSError) -> InputError:
