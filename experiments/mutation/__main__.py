@@ -11,6 +11,7 @@ import json
 import tempfile
 from pathlib import Path
 
+from experiments.mutation.forked import loaded_before
 from experiments.mutation.mutants import drawn
 from experiments.mutation.page import page_of
 from experiments.mutation.trials import copied, tried
@@ -31,6 +32,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "fogml-mutation")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of results.json and results.md")
     asked = parser.parse_args()
+    loaded_before("experiments.mutation.loaded")
     asked.work.mkdir(parents=True, exist_ok=True)
     tree = copied(ROOT, asked.work.resolve())
     every = drawn(tree, asked.count, asked.seed)

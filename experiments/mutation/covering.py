@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from experiments.mutation.forked import ended
 from experiments.mutation.mutants import Mutant
 
 _TIMES = "FOGML_MUTATION_TIMES"
@@ -66,7 +64,7 @@ def measured(root: Path, package: str, work: Path) -> Covering:
     if not (work / f"{package or 'root'}.done").exists():
         for old in (data, times):
             old.unlink(missing_ok=True)
-        _measure(root, tests_of_package(root, package), data, times)
+        _measure(root, tests_of_package(root, package), data, times, work / "output.txt")
         (work / f"{package or 'root'}.done").touch()
     held = CoverageData(str(data))
     held.read()
@@ -86,16 +84,12 @@ def tests_of_package(root: Path, package: str) -> list[str]:
     return sorted(path.relative_to(root).as_posix() for path in (root / "tests").glob("test_*.py"))
 
 
-def _measure(root: Path, tests: list[str], data: Path, times: Path) -> None:
+def _measure(root: Path, tests: list[str], data: Path, times: Path, log: Path) -> None:
+    from coverage.cmdline import main
+
     options = ["--data-file", str(data), "--source", str(root / "fogml")]
     plugin = ["-p", "experiments.mutation.covering", "-p", "no:cacheprovider", "-q", *tests]
-    words = [sys.executable, "-m", "coverage", "run", *options, "-m", "pytest", *plugin]
-    done = subprocess.run(words, cwd=root, env=environment(root) | {_TIMES: str(times)}, check=False)
-    if done.returncode != 0:
-        raise SystemExit(f"{', '.join(tests)}: they fail without any change; mend that first")
-
-
-def environment(root: Path) -> dict[str, Any]:
-    """What tests of a tree run in: that tree's code, one thread."""
-    path = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(path), "OMP_NUM_THREADS": "1"}
+    words = ["run", *options, "-m", "pytest", *plugin]
+    log.unlink(missing_ok=True)
+    if ended(root, main, words, log, variables={_TIMES: str(times)}) != 0:
+        raise SystemExit(f"{', '.join(tests)}: they fail without any change ({log}); mend that first")

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-import resource
+import os
 import shutil
-import subprocess
-import sys
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.mutation.covering import Covering, environment, measured
+import pytest
+
+from experiments.mutation.covering import Covering, measured
+from experiments.mutation.forked import ended
 from experiments.mutation.mutants import Mutant
 
 NOTICED, UNNOTICED, UNTESTED = "noticed", "unnoticed", "no test runs it"
@@ -68,30 +70,29 @@ def _trial(tree: Path, mutant: Mutant, cover: Covering, work: Path, most_s: floa
     if not tests:
         return row | {"state": UNTESTED, "seconds": 0.0}
     file = tree / mutant.path
-    source = file.read_bytes()
+    source, kept = file.read_bytes(), file.stat()
     seconds = sum(cover.seconds[test] for test in tests)
     began = time.monotonic()
     try:
         file.write_bytes(mutant.applied(source))
-        status = _status(tree, tests, work, _SPARE_S + _SLOWER * seconds)
+        status = _status(
+            tree, tests, work / "output.txt", _SPARE_S + _SLOWER * seconds, kernels=b"@kernel" in source
+        )
     finally:
         file.write_bytes(source)
+        os.utime(file, ns=(kept.st_atime_ns, kept.st_mtime_ns))  # what was compiled of it holds again
     if status != 0 and status not in _FAILED and status > 0:
-        raise SystemExit(f"{mutant.key}: pytest ended with {status}")
+        raise SystemExit(f"{mutant.key}: pytest ended with {status} ({work / 'output.txt'})")
     state = UNNOTICED if status == 0 else NOTICED
     return row | {"state": state, "seconds": round(time.monotonic() - began, 1)}
 
 
-def _status(tree: Path, tests: Sequence[str], work: Path, cpu_s: float) -> int:
+def _status(tree: Path, tests: Sequence[str], log: Path, cpu_s: float, kernels: bool) -> int:
     """With what the tests end; negative where they took too long."""
-    asked = work / "asked.txt"
-    asked.write_text("\n".join(tests) + "\n", encoding="utf-8")
-    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"@{asked}"]
-
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(cpu_s), int(cpu_s) + 5))
-
-    done = subprocess.run(
-        words, cwd=tree, env=environment(tree), preexec_fn=limited, capture_output=True, check=False
-    )
-    return done.returncode
+    log.unlink(missing_ok=True)
+    words = ["-x", "-q", "-p", "no:cacheprovider", *tests]
+    if not kernels:
+        return ended(tree, pytest.main, words, log, cpu_s=cpu_s)
+    # What is kept of a kernel holds the kernels of other files that it calls.
+    with tempfile.TemporaryDirectory() as empty:
+        return ended(tree, pytest.main, words, log, variables={"NUMBA_CACHE_DIR": empty}, cpu_s=cpu_s)

@@ -47,6 +47,17 @@ def test_what_stands_in_for_a_name_has_none_of_its_class(found):
     assert found.search.without(best, names).log_prior == pytest.approx(0.0)
 
 
+def test_a_name_is_exchanged_for_each_that_explains_nearly_as_much(found):
+    search, best = found.search, found.explanations[0]
+    (name,) = search.names(best)
+    others = [f for f in search.families_of("known") if f != name]
+    at_hand = best.log_prior + best.log_evidence
+    near = {
+        f for f, e in search.instead(best, name, others).items() if e.score > at_hand - search.priors.hopeless
+    }
+    assert near and near <= search.exchanged(best, name).keys()
+
+
 def test_a_name_is_no_surer_than_its_evidence_and_what_carries_over(found):
     priors = found.setting.priors
     (cause,) = judge(found).causes

@@ -86,6 +86,11 @@ def test_after_a_model_the_slope_is_gone_and_the_loop_stays(cycle):
     model = make_model("polynomial", "T").fit([Unit().run("train", seed=5)])
     values = acceptance_json([cycle], model)
     sensitivity = row(values, "temperature_sensitivity")
+    # Both biases stand against Earth rate, with nothing taken off.
+    assert row(values, "bias")["before"] == pytest.approx(
+        cycle.error_deg_h[cycle.rate == 0.0].mean(), abs=2e-3
+    )
+    assert row(values, "bias")["after"] == pytest.approx(0.0, abs=5e-3)
     # The loop tilts the model's own slope a little.
     assert sensitivity["after"] == pytest.approx(0.03 / 35.0, abs=2e-4)
     assert row(values, "hysteresis")["after"] == pytest.approx(0.03, abs=5e-4)

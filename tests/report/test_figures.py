@@ -108,12 +108,12 @@ def test_the_loop_between_two_runs_is_their_distance() -> None:
     [("N", 1.0), ("K", 1 / np.sqrt(3)), ("R", 1 / np.sqrt(2)), ("B", np.sqrt(2 * np.log(2) / np.pi))],
 )
 def test_terms_by_their_definition_at_one_hour(name: str, at_one_hour: float) -> None:
-    assert term_deviation(name, 1.0, np.array([3600.0]))[0] == pytest.approx(at_one_hour)
+    assert term_deviation(name, 2.0, np.array([3600.0]))[0] == pytest.approx(2.0 * at_one_hour)
 
 
 def test_quantisation_in_microradians() -> None:
     # sigma = sqrt(3) Q / tau, with 1 urad = 0.20626 arcsec, over 1 s in deg/h.
-    assert term_deviation("Q", 1.0, np.array([1.0]))[0] == pytest.approx(np.sqrt(3) * 0.2062648, rel=1e-6)
+    assert term_deviation("Q", 2.0, np.array([1.0]))[0] == pytest.approx(np.sqrt(12) * 0.2062648, rel=1e-6)
 
 
 @pytest.mark.parametrize(("name", "slope"), [("Q", -1.0), ("N", -0.5), ("B", 0.0), ("K", 0.5), ("R", 1.0)])

@@ -183,6 +183,12 @@ class TestStartUp:
         for temperature in (chamber, lagged(chamber, 300.0, 1.0)):
             assert minutes(run_of(time, T=temperature))[0][0] == "ramp_up"
 
+    def test_a_ramp_from_the_first_sample_that_slows_down_a_little_is_no_start_up(self):
+        """Half way at four fifths of its first rate: self-heating would be little more than half as fast."""
+        progress = np.minimum(self.time / 600.0, 1.0)
+        slowing = 25.0 + 8.0 * (progress - 0.25 * progress**2) / 0.75
+        assert minutes(run_of(self.time, T=slowing))[0][0] == "ramp_up"
+
     @pytest.mark.parametrize(("powered_on", "end"), [(0.0, 10.0), (-300.0, 5.0), (-3600.0, None)])
     def test_settled_temperatures_end_it_after_ten_minutes(self, powered_on, end):
         columns = {"time": self.time, "gyro": self.time, "T": np.full(7200, 25.0)}
