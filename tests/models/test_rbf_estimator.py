@@ -200,9 +200,9 @@ def test_patent_goal_stops_at_a_smaller_network() -> None:
     assert early.held_out_mse_ <= goal
     assert len(early.network_.weights) < len(best.network_.weights)
     assert PatentRBFRegressor(goal=1e-9).fit(inputs, target).held_out_mse_ == best.held_out_mse_
-    # A constant beside the target is none of the network's business.
-    moved = PatentRBFRegressor(goal=goal).fit(inputs, target + 50.0)
-    assert moved.held_out_mse_ == pytest.approx(early.held_out_mse_, rel=1e-6)
+    # A constant beside the target, however large, costs no digits.
+    moved = PatentRBFRegressor(goal=goal).fit(inputs, target + 1e6)
+    assert moved.held_out_mse_ == pytest.approx(early.held_out_mse_, rel=1e-4)
     assert len(moved.network_.weights) == len(early.network_.weights)
 
 
