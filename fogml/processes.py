@@ -135,6 +135,22 @@ def in_processes(
             yield future.result()
 
 
+def made_ahead(items: Iterator[Item]) -> Iterator[Item]:
+    """Items in order, each made in a thread while the one before it is worked on.
+
+    The first is made in the caller's own thread, and what it opens belongs to that.
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    end: Any = object()
+    item = next(items, end)
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        while item is not end:
+            coming = beside.submit(next, items, end)
+            yield item
+            item = coming.result()
+
+
 def process_is_alive(pid: int, started: str) -> bool:
     """Whether a process of this machine still runs, and is the one that was meant."""
     try:

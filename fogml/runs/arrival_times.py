@@ -28,6 +28,7 @@ TIME_BETWEEN = 0.45
 """Share of the time that lies between bursts, at least: it is what the samples in a burst are for."""
 DECISIVE_SIGMA = 3.0
 """Standard errors by which the record's own changes must speak for real pauses before they are kept."""
+_SURELY_LONG = 0.999 * LONG_INTERVALS  # leaves room for rounding
 _LEAST_SAMPLES = 4 * LEAST_BURSTS
 _MOST_DEGREE = 3
 _WORTH_A_DEGREE = 1.1
@@ -79,6 +80,11 @@ def burst_ends(time: FloatArray) -> IndexArray | None:
     if len(time) < _LEAST_SAMPLES:
         return None
     count = len(time) - 1
+    # The mean is no less than the shortest interval.
+    shortest = min(steps.min() for _, steps in large.differences(time))
+    longer = sum(np.count_nonzero(steps > _SURELY_LONG * shortest) for _, steps in large.differences(time))
+    if longer < LEAST_BURSTS:
+        return None
     mean = float(time[-1] - time[0]) / count
     if count > 1000:
         # Long real gaps would make the mean interval too long.

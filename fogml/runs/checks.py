@@ -5,11 +5,14 @@ Nothing is changed; each finding says where and how much.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
 
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.processes import available_cores
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
@@ -60,12 +63,17 @@ def check_run(run: Run) -> tuple[Finding, ...]:
     if len(run) < 2:
         return ()
     parts = (implausible, _dropouts, _gaps, _irregular, _stuck, _saturated, _outliers, _span)
-    found: list[Finding] = []
-    with np.errstate(over="ignore", invalid="ignore"):  # values near the greatest float
-        for part in parts:
-            found += part(run)
-            large.release()
-    return tuple(found)
+
+    def look(part: Callable[[Run], Iterator[Finding]]) -> tuple[Finding, ...]:
+        with np.errstate(over="ignore", invalid="ignore"):  # values near the greatest float
+            found = tuple(part(run))
+        large.release()
+        return found
+
+    if len(run) <= large.PIECE:
+        return tuple(chain.from_iterable(map(look, parts)))
+    with ThreadPoolExecutor(available_cores()) as beside:
+        return tuple(chain.from_iterable(beside.map(look, parts)))
 
 
 def _dropouts(run: Run) -> Iterator[Finding]:
@@ -190,7 +198,7 @@ def _resolution(values: FloatArray) -> float:
 
 def _saturated(run: Run) -> Iterator[Finding]:
     gyro = run.gyro
-    greatest, least = float(gyro.max()), float(gyro.min())
+    least, greatest = large.extremes(gyro)
     if greatest == least:
         message = f"'gyro' is {greatest:.6g} in every sample; the output may be dead"
         yield Finding("saturation", message, column="gyro", row=1, count=len(gyro))
@@ -245,7 +253,8 @@ def _span(run: Run) -> Iterator[Finding]:
     temperature = leading_temperature(run)
     if temperature is None:
         return
-    span = float(np.ptp(temperature))
+    least, most = large.extremes(temperature)
+    span = most - least
     if span < SMALL_SPAN_DEGC:
         message = f"the temperature spans {span:.3g} degC only; under 5 degC a drift model is poorly told"
         yield Finding("small_temperature_span", message)

@@ -36,13 +36,13 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
         Naming line and column of the first fault.
     """
     import pyarrow as arrow
-    from pyarrow import csv as arrow_csv
 
     dialect, notes = without_footer(csv_dialect(path))
     try:
-        if not all(quotes_are_plain(part, dialect.separator) for part in dialect.source.whole_lines()):
-            raise _for_line_by_line("quotation marks that the fast parser reads otherwise")
-        table = arrow_csv.read_csv(_opened(dialect), **_options(dialect, dialect.skipped_lines))
+        batches = list(_batches(dialect))
+        if not any(batch.num_rows for batch in batches):
+            raise no_samples(path.name)
+        table = arrow.Table.from_batches(batches)
         clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
         whole = _raw(path, dialect, table, 0, clock)
     except OSError as error:
@@ -50,9 +50,6 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
     except arrow.ArrowException:
         # Arrow is fast and strict; line by line tells where the fault is, or forgives it.
         whole = LineReader(path, dialect, repair).whole()
-    else:
-        if table.num_rows == 0:
-            raise no_samples(path.name)
     cut = cut_line(dialect.source, dialect.separator, dialect.decimal)
     whole = whole.noting([*_doubts(dialect), *notes])
     if cut is None:
@@ -101,11 +98,6 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
 def _doubts(dialect: CsvDialect) -> list[Finding]:
     """What is to be said of the marks in a file's numbers."""
     return [Finding("marks_of_thousands", dialect.doubt)] if dialect.doubt else []
-
-
-def _opened(dialect: CsvDialect) -> Any:
-    """What the fast parser reads: the file itself where its bytes are the table's."""
-    return dialect.source.path if dialect.source.is_plain else dialect.source.open()
 
 
 def _for_line_by_line(reason: str) -> Exception:

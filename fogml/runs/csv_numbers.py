@@ -94,9 +94,11 @@ def marks_of(source: CsvSource, rows: Sequence[Sequence[str]], separator: str) -
     """
     fields = [field for row in rows for field in row]
     for mark in ".,":
-        if any(_EVIDENT[mark].match(field) and mark in field and _OTHER[mark] in field for field in fields):
+        if any(mark in field and _OTHER[mark] in field and _EVIDENT[mark].match(field) for field in fields):
             return Marks(mark, True)
-    with_mark = {mark: [field for field in fields if _DECIMAL[mark].match(field)] for mark in ".,"}
+    with_mark = {
+        mark: [field for field in fields if mark in field and _DECIMAL[mark].match(field)] for mark in ".,"
+    }
     in_threes = {
         mark: bool(found) and all(_GROUPS[_OTHER[mark]].match(field) for field in found)
         for mark, found in with_mark.items()

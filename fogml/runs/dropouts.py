@@ -133,8 +133,12 @@ def last_reading(time: FloatArray, values: FloatArray, found: Reading) -> LastRe
 def _read(time: FloatArray, values: FloatArray, rule: DropoutRule, before: LastReading | None) -> Reading:
     if len(values) < 2:
         return Reading(values)
-    ranged = large.each(lambda x: (x >= rule.low_degC) & (x <= rule.high_degC), values, kind=bool)
     none_rejected = before is None or before.rejected is None
+    least, most = large.extremes(values)
+    in_range = least >= rule.low_degC and most <= rule.high_degC
+    if none_rejected and in_range and _greatest_step(values) <= rule.jump_degC:
+        return Reading(values)
+    ranged = large.each(lambda x: (x >= rule.low_degC) & (x <= rule.high_degC), values, kind=bool)
     if ranged.all() and none_rejected and not len(_jumps(time, values, rule, rule.jump_degC)):
         return Reading(values)
     if before is None and np.count_nonzero(ranged) < _LEAST_GOOD * len(values):
@@ -159,6 +163,11 @@ def _read(time: FloatArray, values: FloatArray, rule: DropoutRule, before: LastR
     if not bad.any() or (before is None and np.count_nonzero(bad) > (1.0 - _LEAST_GOOD) * len(values)):
         return Reading(values)
     return Reading(cleaned, bad)
+
+
+def _greatest_step(values: FloatArray) -> float:
+    """Largest step from one reading to the next [degC]."""
+    return max(max(-steps.min(), steps.max()) for _, steps in large.differences(values))
 
 
 def _jumps(time: FloatArray, values: FloatArray, rule: DropoutRule, jump_degC: float) -> IndexArray:

@@ -5,7 +5,7 @@ Each is said before anything else, as every figure after it would be wrong.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -51,6 +51,7 @@ COUNTS = 400.0
 """Readings all beyond this are no temperature in any unit."""
 _RELATED_DEGC = 5.0
 _APART_IN_FAHRENHEIT = 10.0
+_NEAR_SHARE = 0.99  # leaves room for rounding
 
 
 def implausible(run: Run) -> Iterator[Finding]:
@@ -122,6 +123,9 @@ def _temperature_units(run: Run) -> Iterator[Finding]:
 
 def _unit_told(values: FloatArray) -> str | None:
     """What a temperature seems to be in, if not in degC."""
+    least, most = large.extremes(values)
+    if least >= -COUNTS and most <= HOTTEST_DEGC:
+        return None
     low, middle, high = large.quantiles(large.parts_of(values), [0.02, 0.5, 0.98])
     if KELVIN[0] <= low and high <= KELVIN[1] and middle > HOTTEST_DEGC:
         return f"reads {low:.4g} to {high:.4g}: kelvin? Write the header with [K]"
@@ -132,6 +136,8 @@ def _unit_told(values: FloatArray) -> str | None:
 
 def _thermometers(run: Run) -> Iterator[Finding]:
     names = [name for name in run.temperature_columns if _unit_told(run.columns[name]) is None]
+    if _most_apart([run.columns[name] for name in names]) < _NEAR_SHARE * _APART_IN_FAHRENHEIT:
+        return
     means = {name: large.median(large.parts_of(run.columns[name])) for name in names}
     pairs = [(a, b) for a in names for b in names if means[b] > means[a]]
     odd = {}
@@ -148,6 +154,15 @@ def _thermometers(run: Run) -> Iterator[Finding]:
             "is one of them in another unit, or dead?"
         )
         yield Finding("thermometers_apart", told, column=a, count=len(run))
+
+
+def _most_apart(columns: Sequence[FloatArray]) -> float:
+    """A bound on how far apart the medians of columns are: each differs from the first by what samples do."""
+    apart = [0.0]
+    for other in columns[1:]:
+        for part in large.parts_of(other, np.subtract, columns[0])():
+            apart += [part.min(), part.max()]
+    return float(np.ptp(apart))
 
 
 def _same_in_fahrenheit(warm: FloatArray, cold: FloatArray) -> bool:

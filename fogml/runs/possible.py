@@ -29,8 +29,7 @@ def faulty(name: str, values: FloatArray) -> BoolArray | None:
     """Which values of a column of the run format no recording holds, shape (n,); None where all are sound."""
     if column_spec(name) is None or len(values) == 0:
         return None
-    low, high = values.min(), values.max()  # NaN where any value is
-    large.release()
+    low, high = large.extremes(values)  # NaN where any value is
     if low >= -GREATEST and high <= GREATEST:
         return None
     with np.errstate(invalid="ignore"):

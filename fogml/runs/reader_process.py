@@ -122,7 +122,9 @@ class StoredFile:
         megabytes = self.path.stat().st_size / 1e6 if self.path.exists() else 0.0
         for_size = self.limits.cpu_s_per_mb * megabytes
         request = {**request, "file": self._number, "cpu_s": self.limits.cpu_s + for_size}
-        told = self._process.ask(request, into, self.limits.wall_s + 2.0 * for_size)
+        # Several files may be read at once, each ahead of where its blocks are used.
+        with self._process.one_at_a_time:
+            told = self._process.ask(request, into, self.limits.wall_s + 2.0 * for_size)
         if told is None:
             raise InputError(f"{self.path.name}: damaged: {self._process.end()}; copy or export it again")
         if "memory" in told:
@@ -223,6 +225,7 @@ class ReaderProcess:
         )  # fmt: skip
         self.is_alive = True
         self._timed_out = False
+        self.one_at_a_time = threading.Lock()
         self._finish = weakref.finalize(self, _finish, self._process, os.getpid())
 
     def is_ready(self) -> bool:

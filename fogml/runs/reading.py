@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fogml.errors import InputError, listed, quoted
+from fogml.processes import made_ahead
 from fogml.readers import READERS, reader_of, reader_of_content
 from fogml.runs.assemble import MOST_DROPPED, Assembler, needs_whole, runs_of_table, too_short
 from fogml.runs.checks import check_run
@@ -129,7 +130,7 @@ def read_blocks(
     most_dropped: float = MOST_DROPPED,
     limits: ReadingLimits = DEFAULT_LIMITS,
 ) -> Iterator[Run]:
-    """Read a run in blocks of at most `block_rows` rows, in bounded memory.
+    """Read a run in blocks of at most `block_rows` rows, in bounded memory, one ahead of their use.
 
     Blocks share name and facts. Order of time is checked across their borders. A variable of a MATLAB
     file of version 5 is held whole while it is unpacked; so is a file to repair, and one whose first
@@ -171,10 +172,10 @@ def read_blocks(
         )
         return
     with unchanged(*run_sources(path)):
-        kind = file_format(path)
         assembler = Assembler(path)
         one = OneAxis(axis)
-        for table in map(one.table, _table_blocks(path, kind, block_rows, one.columns(columns), limits)):
+        blocks = _table_blocks(path, file_format(path), block_rows, one.columns(columns), limits)
+        for table in map(one.table, made_ahead(blocks)):
             held = [parse_header(cell)[0] for cell in table.columns]
             missing = [column for column in columns or () if column not in held]
             if missing:
@@ -208,9 +209,8 @@ def _joined(path: Path, blocks: Iterable[Run], name: str | None) -> Run:
         for column, values in block.columns.items():
             columns.setdefault(column, Growing()).append(values)
         findings.update(dict.fromkeys(block.findings))
-        last = block
     held = {column: values.array() for column, values in columns.items()}
-    return Run.derived(name or path.name, held, last.facts, last.gyro_unit, tuple(findings))
+    return Run.derived(name or path.name, held, block.facts, block.gyro_unit, tuple(findings))
 
 
 def _cut(run: Run, columns: Collection[str] | None, block_rows: int) -> Iterator[Run]:

@@ -26,6 +26,9 @@ def turning(run: Run) -> BoolArray:
 
     A measured rate counts as zero within six times its own noise.
     """
+    slowest, fastest = large.extremes(run.rate)
+    if slowest >= -LEAST_RATE_DEG_S and fastest <= LEAST_RATE_DEG_S:
+        return np.zeros(len(run), dtype=bool)
     least = least_rate_deg_s(run)
     return large.each(lambda rate: np.abs(rate) > least, run.rate, kind=bool)
 

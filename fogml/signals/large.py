@@ -25,7 +25,7 @@ HELD_VALUES = 1 << 20
 PIECE = 1 << 18
 """Values of a longer array that are worked on at once: 2 MiB of float64."""
 _SAMPLE = 1 << 16
-"""Values that a quantile is first sought among: with as many, one look at all keeps some 2 % of them."""
+"""Values that are sorted for a quantile, of more a sample: one look at all then keeps some 2 % of them."""
 _shown: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
@@ -83,17 +83,15 @@ class Growing:
     def append(self, values: NDArray[Any]) -> None:
         """Put values behind those that are there."""
         self._count += len(values)
-        self._held.append(np.array(values, dtype=self._kind))
-        if self._count > HELD_VALUES:
-            self._write()
-
-    def _write(self) -> None:
+        if self._count <= HELD_VALUES:
+            self._held.append(np.array(values, dtype=self._kind))
+            return
         if self._file is None:
             self._file = tempfile.TemporaryFile(prefix="fogml-")  # noqa: SIM115  closed when nobody holds it
             weakref.finalize(self, self._file.close)
         try:
-            for values in self._held:
-                self._file.write(values.data)
+            for part in (*self._held, values):
+                self._file.write(np.ascontiguousarray(part, dtype=self._kind).data)
             self._file.flush()
         except OSError as error:
             raise _no_room(self._kind.itemsize * self._count, error) from None
@@ -189,6 +187,12 @@ def differences(values: NDArray[Any], order: int = 1) -> Iterator[tuple[int, NDA
         yield part.start, np.diff(values[part], order)
 
 
+def extremes(values: FloatArray) -> tuple[float, float]:
+    """The least and the greatest of values, NaN where one of them is; infinite where there are none."""
+    found = np.array([(np.inf, -np.inf), *((x.min(), x.max()) for x in parts_of(values)())])
+    return float(found[:, 0].min()), float(found[:, 1].max())
+
+
 def standard_deviation(values: FloatArray) -> float:
     """``numpy.std`` of values."""
     if len(values) <= HELD_VALUES:
@@ -210,8 +214,8 @@ def parts_of(
 
 def median(parts: Parts) -> float:
     """``numpy.median`` of values that are given part by part, as often as they are asked for."""
-    kept = _Thinned(HELD_VALUES).all_of(parts)
-    if kept.count <= HELD_VALUES:
+    kept = _Thinned(most := min(_SAMPLE, HELD_VALUES)).all_of(parts)
+    if kept.count <= most:
         return float(np.median(kept.values())) if kept.count else float("nan")
     below, above = _neighbours(parts, (kept.count - 1) // 2, kept)
     return below if kept.count % 2 else 0.5 * (below + above)
@@ -230,8 +234,8 @@ def quantiles(parts: Parts, shares: Iterable[float]) -> list[float]:
     shares
         Of the values that lie below each quantile.
     """
-    kept = _Thinned(HELD_VALUES).all_of(parts)
-    if kept.count <= HELD_VALUES:
+    kept = _Thinned(most := min(_SAMPLE, HELD_VALUES)).all_of(parts)
+    if kept.count <= most:
         return [float(value) for value in np.quantile(kept.values(), list(shares))]
     found = []
     for share in shares:
@@ -254,13 +258,13 @@ class _Thinned:
         self._kept: list[FloatArray] = []
 
     def add(self, values: FloatArray) -> None:
-        self._kept.append(np.array(values[-self.count % self._stride :: self._stride]))
-        self.count += len(values)
-        self._held += len(self._kept[-1])
-        while self._held > self._most:
+        while self._held + len(fresh := values[-self.count % self._stride :: self._stride]) > self._most:
             self._stride *= 2
             self._kept = [self.values()[::2]]
             self._held = len(self._kept[0])
+        self._kept.append(np.array(fresh))
+        self._held += len(fresh)
+        self.count += len(values)
 
     def all_of(self, parts: Parts, above: float | None = None, below: float | None = None) -> _Thinned:
         """With those of some parts added that lie beyond one value and under another."""
@@ -280,7 +284,7 @@ def _neighbours(parts: Parts, rank: int, kept: _Thinned) -> tuple[float, float]:
     before, inside = 0, kept.count
     sample = kept.values()
     while True:
-        sample = np.sort(sample[:: max(len(sample) // _SAMPLE, 1)])
+        sample = np.sort(sample)
         # A rank in a random sample is off by half a root of its size; by four times that rarely.
         middle = (rank - before) / inside * len(sample)
         margin = 2.0 * np.sqrt(len(sample)) + 1.0
@@ -289,10 +293,10 @@ def _neighbours(parts: Parts, rank: int, kept: _Thinned) -> tuple[float, float]:
         under = up_to_first = up_to_last = 0
         between = _Thinned(HELD_VALUES)
         for part in parts():
-            above = part[part > first]
+            above = part > first
             under += int(np.count_nonzero(part < first))
-            up_to_first += len(part) - len(above)
-            between.add(above[above < last])
+            up_to_first += len(part) - int(np.count_nonzero(above))
+            between.add(part[above & (part < last)])
             up_to_last += int(np.count_nonzero(part <= last))
         under_last = up_to_first + between.count
         if under <= rank < up_to_first:

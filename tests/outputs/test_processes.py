@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 import warnings
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from fogml.outputs import settle
-from fogml.processes import in_processes, process_is_alive, process_start
+from fogml.processes import in_processes, made_ahead, process_is_alive, process_start
 
 ROOT = Path(__file__).parents[2]
 HANGING = """
@@ -106,3 +107,32 @@ def test_processes_give_what_the_function_gives(workers, capfd):
     with pytest.raises(ValueError, match="3"):
         list(in_processes(refuse, [3, 3], workers))
     assert "overflow" not in capfd.readouterr().err
+
+
+def test_what_is_made_ahead_is_one_item_in_order_and_faults_come_with_theirs():
+    made, began = [], threading.Event()
+
+    def items():
+        for i in range(5):
+            if i == 3:
+                raise ValueError("the fourth")
+            made.append((i, threading.get_ident()))
+            if i == 1:
+                began.set()
+            yield i
+
+    taken = made_ahead(items())
+    assert next(taken) == 0
+    assert began.wait(60.0), "the second is made while the first is worked on"
+    assert [next(taken), next(taken)] == [1, 2]
+    assert made[0][1] == threading.get_ident() and len({thread for _, thread in made[1:]}) == 1
+    with pytest.raises(ValueError, match="the fourth"):
+        next(taken)
+
+
+def test_what_is_made_ahead_is_not_made_on_once_it_is_left():
+    made = []
+    taken = made_ahead(made.append(i) or i for i in range(1000))
+    assert next(taken) == 0
+    taken.close()
+    assert len(made) <= 2

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fogml.runs import arrival_times, dropouts, plausible
 from fogml.runs.checks import MOVED_DEGC, STUCK_S, check_run
 from fogml.runs.outliers import _none_stands_out, _off_neighbours, find_outliers
 from fogml.runs.run import Run
@@ -65,3 +66,33 @@ def test_outliers_of_every_height(samples, quantum, monkeypatch):
     for bounded, exact in zip(quick, [find_outliers(gyro) for gyro in outputs]):
         np.testing.assert_array_equal(bounded, exact)
     assert 0 < ruled_out < len(outputs) or samples == 5 or quantum > 1.0
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    apart=st.sampled_from([0.0, 4.0, 9.5, 79.9, 80.1, "Fahrenheit"]),
+    jitter=st.sampled_from([0.0, 0.3, 0.5, 0.9]),
+    burst=st.sampled_from([1, 2, 7]),
+    step=st.sampled_from([0.0, 4.9, 5.1, 30.0]),
+    dropout=st.sampled_from([20.0, -127.0, 85.0]),
+    seed=st.integers(0, 1000),
+)
+def test_bounds_of_clocks_and_thermometers(apart, jitter, burst, step, dropout, seed):
+    rng = np.random.default_rng(seed)
+    rows = int(rng.integers(5, 3000))
+    time = np.arange(rows) + rng.uniform(0.0, jitter, rows)
+    time = time // burst * burst + 0.01 * (time % burst)
+    inner = 20.0 + 10.0 * np.sin(time / 300.0) + rng.normal(0.0, 0.01, rows)
+    outer = 1.8 * inner + 32.0 if apart == "Fahrenheit" else inner + apart
+    outer[rows // 2 :] += step
+    outer[rng.integers(0, rows)] = dropout
+    columns = {"time": time, "gyro": rng.normal(size=rows), "T_in": inner, "T_out": outer}
+    run = Run.derived("run", columns)
+    quick = check_run(run), arrival_times.burst_ends(time)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(plausible, "_most_apart", lambda columns: np.inf)
+        patched.setattr(dropouts, "_greatest_step", lambda values: np.inf)
+        patched.setattr(arrival_times, "_SURELY_LONG", 0.0)
+        exact = check_run(Run.derived("run", columns)), arrival_times.burst_ends(time)
+    assert quick[0] == exact[0]
+    np.testing.assert_equal(quick[1], exact[1])
