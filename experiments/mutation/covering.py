@@ -60,12 +60,15 @@ def measured(root: Path, package: str, work: Path) -> Covering:
     """What covers a package's files; measured if `work` does not hold it yet."""
     from coverage import CoverageData
 
-    data, times = work / f"{package or 'root'}.coverage", work / f"{package or 'root'}.times"
-    if not (work / f"{package or 'root'}.done").exists():
+    data, times, done = (work / f"{package}.{kind}" for kind in ("coverage", "times", "done"))
+    tests = tests_of_package(root, package)
+    if not tests:
+        return Covering({}, {})
+    if not done.exists():
         for old in (data, times):
             old.unlink(missing_ok=True)
-        _measure(root, tests_of_package(root, package), data, times, work / "output.txt")
-        (work / f"{package or 'root'}.done").touch()
+        _measure(root, tests, data, times, work / "output.txt")
+        done.touch()
     held = CoverageData(str(data))
     held.read()
     lines: dict[str, dict[int, list[str]]] = {}
@@ -78,10 +81,14 @@ def measured(root: Path, package: str, work: Path) -> Covering:
 
 
 def tests_of_package(root: Path, package: str) -> list[str]:
-    """Where a package's own tests are."""
-    if package:
+    """Where a package's or module's own tests are; of what has none, those that import it."""
+    tests = root / "tests"
+    if (tests / package).is_dir():
         return [f"tests/{package}"]
-    return sorted(path.relative_to(root).as_posix() for path in (root / "tests").glob("test_*.py"))
+    found = sorted(tests.glob(f"test_{package}*.py")) or [
+        file for file in sorted(tests.rglob("test_*.py")) if f"fogml.{package}" in file.read_text("utf-8")
+    ]
+    return [file.relative_to(root).as_posix() for file in found]
 
 
 def _measure(root: Path, tests: list[str], data: Path, times: Path, log: Path) -> None:

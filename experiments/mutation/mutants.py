@@ -64,9 +64,8 @@ class Mutant:
 
     @property
     def package(self) -> str:
-        """The package under ``fogml``; empty for its own modules."""
-        parts = Path(self.path).parts
-        return parts[1] if len(parts) > 2 else ""
+        """The package or module under ``fogml``."""
+        return Path(self.path).with_suffix("").parts[1]
 
     def applied(self, source: bytes) -> bytes:
         """The file with the change."""
