@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
+import sys
 import tempfile
 from pathlib import Path
 
@@ -32,6 +34,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "fogml-mutation")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of results.json and results.md")
     asked = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # a file that is changed is put right
     loaded_before("experiments.mutation.loaded")
     asked.work.mkdir(parents=True, exist_ok=True)
     tree = copied(ROOT, asked.work.resolve())

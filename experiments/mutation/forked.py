@@ -34,7 +34,10 @@ def ended(
     told = (tree, main, list(words), log, dict(variables or {}), cpu_s)
     process = _CONTEXT.Process(target=_begun, args=told)
     process.start()
-    process.join()
+    try:
+        process.join()
+    finally:
+        process.kill()
     assert process.exitcode is not None
     return process.exitcode
 
