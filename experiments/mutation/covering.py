@@ -91,6 +91,20 @@ def tests_of_package(root: Path, package: str) -> list[str]:
     return [file.relative_to(root).as_posix() for file in found]
 
 
+def tests_that_import(root: Path, path: str) -> list[str]:
+    """Test files that import a file's module, else one that imports it: kernels' lines are not measured."""
+
+    def importing(path: str, folder: str) -> list[str]:
+        told = f"from {path.removesuffix('.py').replace('/', '.')} import"
+        found = [file for file in (root / folder).rglob("*.py") if told in file.read_text("utf-8")]
+        return [file.relative_to(root).as_posix() for file in found]
+
+    tests = importing(path, "tests") or [
+        t for user in importing(path, "fogml") for t in importing(user, "tests")
+    ]
+    return sorted({test for test in tests if Path(test).name.startswith("test_")})
+
+
 def _measure(root: Path, tests: list[str], data: Path, times: Path, log: Path) -> None:
     from coverage.cmdline import main
 

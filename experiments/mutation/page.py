@@ -29,7 +29,7 @@ def page_of(rows: Sequence[Mapping[str, Any]], drawn: int, seed: int, explained:
         "# Do the tests notice a change?",
         "",
         "One operator or one number of the code is changed, and the tests of its own package that run the "
-        "changed line, or where none does its file, are run until one fails. "
+        "changed line, or where none does its file, or else those that import it, are run until one fails. "
         "`python -m experiments.mutation`; it goes on where it was interrupted.",
         "",
         f"Of {drawn} changes drawn over all code (seed {seed}), {len(rows)} were tried. "

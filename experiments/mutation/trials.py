@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from experiments.mutation.covering import Covering, measured
+from experiments.mutation.covering import Covering, measured, tests_that_import
 from experiments.mutation.forked import ended
 from experiments.mutation.mutants import Mutant
 
@@ -56,7 +56,7 @@ def tried(tree: Path, mutants: Sequence[Mutant], work: Path, most_s: float) -> I
 
 
 def _trial(tree: Path, mutant: Mutant, cover: Covering, work: Path, most_s: float) -> dict[str, Any]:
-    tests = cover.tests_of(mutant, most_s)
+    tests = cover.tests_of(mutant, most_s) or tests_that_import(tree, mutant.path)
     row = {
         "path": mutant.path,
         "line": mutant.first,
@@ -71,7 +71,7 @@ def _trial(tree: Path, mutant: Mutant, cover: Covering, work: Path, most_s: floa
         return row | {"state": UNTESTED, "seconds": 0.0}
     file = tree / mutant.path
     source, kept = file.read_bytes(), file.stat()
-    seconds = sum(cover.seconds[test] for test in tests)
+    seconds = sum(cover.seconds.get(test, 1.0) for test in tests)
     began = time.monotonic()
     try:
         file.write_bytes(mutant.applied(source))
