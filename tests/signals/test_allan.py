@@ -8,7 +8,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.signals.allan import allan_deviation
-from fogml.signals.allan_confidence import degrees_of_freedom
+from fogml.signals.allan_confidence import degrees_of_freedom, noise_exponents
 
 
 def flicker(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -157,3 +157,11 @@ def test_values_that_are_not_finite():
         allan_deviation([0.0, 1.0, np.nan, 2.0, 3.0], 1.0)
     with pytest.raises(InputError, match="one series"):
         allan_deviation(np.zeros((5, 2)), 1.0)
+
+
+def test_one_averaging_time_alone_tells_its_noise():
+    """Steps of a rounded angle undo each other: correlations of -1/2, and of -2/3 of their differences."""
+    alone = np.array([[1.0, -0.5, 3.0, -2.0]])
+    assert noise_exponents(alone, np.array([100])).tolist() == [2]
+    assert noise_exponents(alone, np.array([29])).tolist() == [0]
+    assert noise_exponents(alone[:0], np.array([], dtype=np.intp)).tolist() == []

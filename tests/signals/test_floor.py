@@ -5,9 +5,9 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from fogml.errors import InputError
-from fogml.signals.averages_noise import averages_variance
+from fogml.signals.averages_noise import FastNoise, averages_variance
 from fogml.signals.flicker import Flicker
-from fogml.signals.floor import noise_floor, realised_noise_floor
+from fogml.signals.floor import noise_floor, quiet_parts, realised_noise_floor
 from fogml.signals.noise_expectation import floor_square
 from fogml.signals.noise_model import NoiseModel
 
@@ -184,3 +184,32 @@ def test_realised_floor_is_that_of_the_very_run():
     assert got == pytest.approx(noise.reshape(10, 100).mean(axis=1).std(), rel=1e-12)
     with pytest.raises(InputError, match="two are needed"):
         realised_noise_floor(np.arange(100.0), noise[:100], 100.0)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_what_is_loud_is_so_in_any_unit(unit):
+    """A block thrice as loud is noise still, one ten times as loud is left out."""
+    for times, parts in ((1.5, [(0, 3200)]), (10.0, [(0, 1000), (1200, 3200)])):
+        values = np.random.default_rng(5).standard_normal(3200)
+        values[1000:1200] *= times
+        found = quiet_parts(unit * values, np.array([0]), np.array([3200]), 1)
+        assert len(found) == len(parts)
+        assert np.abs(np.array(found) - np.array(parts)).max() <= 2 * 3199 // 32
+
+
+def test_stretches_of_three_rows_are_kept():
+    assert quiet_parts(np.zeros(9), np.array([0, 4, 6]), np.array([3, 6, 9]), 1) == [(0, 3), (6, 9)]
+
+
+def test_variance_of_fast_noise_is_known_as_well_as_its_coefficients():
+    """Of squares of normal coefficients, many times over."""
+    rng, frequency = np.random.default_rng(6), np.linspace(0.05, 0.5, 5)[:, None]
+    count, power = np.full(5, 20.0), np.array([4.0, 3.0, 2.0, 1.0, 0.5])
+
+    def of(power):
+        return FastNoise(0.05, frequency, power, count, 200.0, 1.0).averages_variance(10.0, 50)
+
+    drawn = [of(power * rng.chisquare(count) / count)[0] for _ in range(4000)]
+    value, variance = of(power)
+    assert np.mean(drawn) == pytest.approx(value, rel=0.02)
+    assert np.var(drawn) == pytest.approx(variance, rel=0.1)

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import kstest
 
 from fogml.errors import InputError
-from fogml.signals.noise_fit import NoisePrior, _log_likelihood, fit_noise
-from fogml.signals.noise_fit_data import fit_data
+from fogml.signals.noise_fit import NoisePrior, _curvature, _log_likelihood, _moments, fit_noise
+from fogml.signals.noise_fit_data import _columns, fit_data
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.random_noise import flicker_noise, random_walk, white_noise
 from fogml.signals.whitening import Whitener
@@ -143,3 +143,25 @@ def test_bad_input_is_refused():
         fit_noise([time], [np.ones(100)])
     with pytest.raises(InputError, match="factor"):
         NoisePrior(TRUTH, 1.0)
+
+
+def test_moments_of_a_normal_posterior_are_its_own():
+    """Guessed as they are, most points count; the curvature at its top is the inverse covariance."""
+    mean, covariance = np.array([0.3, -1.0]), np.array([[0.5, 0.2], [0.2, 0.3]])
+    inverse = np.linalg.inv(covariance)
+
+    def loss(x):
+        return 0.5 * float((x - mean) @ inverse @ (x - mean)) + 7.0
+
+    centre, spread, matter = _moments(loss, mean, covariance, 7.0)
+    assert centre == pytest.approx(mean, abs=0.05) and spread == pytest.approx(covariance, rel=0.2, abs=0.02)
+    assert 32.0 < matter <= 64.0
+    away, steps = np.array([2.0, 1.0]), np.array([1e-2, 2e-2])
+    assert _curvature(loss, away, steps) == pytest.approx(inverse, rel=1e-6)
+
+
+def test_a_constant_is_as_wide_as_its_column_times_its_deviation():
+    column = [np.linspace(-1.0, 2.0, 50)[:, None] ** 3]
+    (wide, prior), (scaled, same) = _columns(column, [4.0]), _columns([4.0 * column[0]], [1.0])
+    np.testing.assert_allclose(wide, scaled)
+    np.testing.assert_array_equal(prior, same)

@@ -1,0 +1,107 @@
+"""What withheld effects and their worlds must obey, whatever is drawn of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fogml.blind.first.effects.electrical import Crosstalk
+from fogml.blind.first.effects.invented import HotBursts
+from fogml.blind.first.effects.turning import HuntingServo
+from fogml.blind.frame import nominal
+from fogml.blind.frame.form import Additive
+from fogml.blind.frame.noise import StateNoise
+from fogml.blind.plan import REALITIES, reality
+from fogml.blind.second.reality import _field, humidity_of
+
+TIME = 10.0 * np.arange(6000.0)
+HIDDEN = [
+    form
+    for name in REALITIES
+    for form in reality(name).known
+    if form.name == "hidden_thermal_node" and issubclass(form, Additive)
+]
+
+
+def world(**more: Any) -> Any:
+    """A world in which everything is at 40 degC and rests."""
+    still = {
+        "nodes": defaultdict(lambda: np.full(len(TIME), 40.0)),
+        "rates": defaultdict(lambda: np.zeros(len(TIME))),
+        "drives": defaultdict(lambda: np.zeros(len(TIME))),
+    }
+    return SimpleNamespace(time=TIME, sample_s=10.0, past=(), **(still | more))
+
+
+@pytest.mark.parametrize("form", HIDDEN, ids=lambda form: form.form)
+def test_a_hidden_node_that_is_as_warm_as_the_coil_shows_nothing(form: type[Additive]) -> None:
+    rng = np.random.default_rng(1)
+    found = form().response(world(), form().draw(rng), rng)
+    assert found == pytest.approx(np.zeros(len(TIME)), abs=1e-9)
+
+
+def test_cross_talk_grows_with_the_supply_times_its_ratio() -> None:
+    supply = 12.0 + 0.5 * (TIME > 30_000.0)
+    shown = world(drives={"supply": supply})
+    none, one, three = (
+        Crosstalk().response(shown, {"supply_ratio": ratio, "bend": 0.0}, np.random.default_rng(1))
+        for ratio in (0.0, 2.0, 6.0)
+    )
+    assert one - none == pytest.approx(2.0 * (supply - 12.0)) and three - none == pytest.approx(
+        3.0 * (one - none)
+    )
+
+
+def test_a_hunting_servo_swings_in_its_period() -> None:
+    shown = world(table_rate=np.full(len(TIME), 0.1))
+    found = HuntingServo().response(shown, {"period": 600.0, "phase": 0.3}, np.random.default_rng(1))
+    assert np.argmax(np.abs(np.fft.rfft(found))) == len(TIME) * 10 // 600
+
+
+def test_bursts_have_unit_variance_and_their_correlation() -> None:
+    found = HotBursts().response(world(), {"from": 30.0, "correlation": 50.0}, np.random.default_rng(1))
+    assert np.var(found) == pytest.approx(1.0, rel=0.1)
+    assert np.mean(found[5:] * found[:-5]) == pytest.approx(np.exp(-1.0), abs=0.05)
+    cold = HotBursts().response(world(), {"from": 41.0, "correlation": 50.0}, np.random.default_rng(1))
+    assert not cold.any()
+
+
+def test_air_that_nothing_dries_stays_as_wet_as_the_room() -> None:
+    air = np.full(3000, 25.0)
+    still = humidity_of(np.random.default_rng(2), air, np.zeros(3000), 5.0)
+    assert np.ptp(still) < 1e-9
+    dried = humidity_of(np.random.default_rng(2), air, np.ones(3000), 5.0)
+    assert dried[0] < still[0] and np.all(np.diff(dried) <= 0.0)
+
+
+def test_the_field_turns_against_the_table() -> None:
+    angle, off = np.linspace(0.0, 720.0, 200), np.zeros(200)
+    field = _field(np.random.default_rng(3), angle, off, off, 45.0)
+    way = np.unwrap(np.arctan2(field["B_y"], field["B_x"]))
+    assert way - way[0] == pytest.approx(-np.radians(angle))
+
+
+@pytest.mark.parametrize("name", list(nominal.PRIOR_SD))
+def test_a_column_is_what_a_unit_of_its_constant_adds(name: str) -> None:
+    rng = np.random.default_rng(4)
+    seen = nominal.Seen(
+        *(rng.uniform(-40.0, 60.0, 50) for _ in range(3)), 3600.0 * rng.uniform(-50.0, 50.0, 50)
+    )
+    constants = nominal.draw_constants(rng, True)
+    more = replace(constants, **{name: getattr(constants, name) + 1.0})
+    (column,) = nominal.columns(seen, (name,)).T
+    assert column == pytest.approx(
+        nominal.output(more, seen) - nominal.output(constants, seen), rel=1e-5, abs=1e-8
+    )
+
+
+def test_equal_variances_in_each_half_decade_are_the_flicker_that_is_told() -> None:
+    taus_s = np.geomspace(1.0, 1e6, 13)
+    variances = np.full(13, 0.02**2 / np.pi * np.log(np.sqrt(10.0)))
+    told = StateNoise(0.003, variances, taus_s, 0.001).amounts()
+    assert told["B"][0] == pytest.approx(0.02, rel=0.03)
