@@ -31,6 +31,9 @@ def main() -> None:
     parser.add_argument("--packages", nargs="*", metavar="NAME", help="only the drawn changes of these")
     parser.add_argument("--first", type=int, help="only so many of them")
     parser.add_argument("--most", type=float, default=60.0, help="time of the tests of a change [s]")
+    parser.add_argument(
+        "--unmeasured", action="store_true", help="run the tests that import a file, whatever they cover"
+    )
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "fogml-mutation")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of results.json and results.md")
     asked = parser.parse_args()
@@ -41,7 +44,7 @@ def main() -> None:
     every = drawn(tree, asked.count, asked.seed)
     chosen = [one for one in every if asked.packages is None or one.package in asked.packages][: asked.first]
     rows = []
-    for row in tried(tree, chosen, asked.work.resolve(), asked.most):
+    for row in tried(tree, chosen, asked.work.resolve(), asked.most, not asked.unmeasured):
         rows.append(row)
         print(f"{len(rows)} of {len(chosen)}: {row['state']}: {row['key']} ({row['seconds']} s)", flush=True)
     explained = json.loads((HERE / "explained.json").read_text(encoding="utf-8"))

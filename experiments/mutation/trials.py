@@ -38,8 +38,13 @@ def copied(root: Path, work: Path) -> Path:
     return tree
 
 
-def tried(tree: Path, mutants: Sequence[Mutant], work: Path, most_s: float) -> Iterator[dict[str, Any]]:
-    """What became of each change, those tried before from `work`; interrupted, it goes on from there."""
+def tried(
+    tree: Path, mutants: Sequence[Mutant], work: Path, most_s: float, measures: bool = True
+) -> Iterator[dict[str, Any]]:
+    """What became of each change, those tried before from `work`; interrupted, it goes on from there.
+
+    Unless it `measures` what covers a package, tests are those that import a changed file.
+    """
     log = work / "tried.jsonl"
     rows = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
     known = {(row["path"], *row["span"], row["after"]): row for row in map(json.loads, rows)}
@@ -48,7 +53,9 @@ def tried(tree: Path, mutants: Sequence[Mutant], work: Path, most_s: float) -> I
         row = known.get((mutant.path, *mutant.span, mutant.after))
         if row is None:
             if mutant.package not in covers:
-                covers[mutant.package] = measured(tree, mutant.package, work)
+                covers[mutant.package] = (
+                    measured(tree, mutant.package, work) if measures else Covering({}, {})
+                )
             row = _trial(tree, mutant, covers[mutant.package], work, most_s)
             with log.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")

@@ -142,9 +142,24 @@ def test_fixed_point_stays_within_its_proven_bound(model_of, tmp_path, name, dty
 
 
 @needs_cc
-def test_slopes_over_bins_stay_within_their_proven_bound(tmp_path):
-    model = make_model("polynomial", features="T_in, dT_in[slope, 60 s], diff(T_in)[slope, 40 s]")
-    plan = Plan.of(model.fit(training_run()), 0.05)
+def test_a_coefficient_between_two_whole_numbers_stays_within_the_proven_bound(tmp_path):
+    """Half a unit of 2^-22 of 60 degC, which a slope of 2000 deg/h/degC shows."""
+    steep = Run("steep", ramps().columns | {"gyro": 1000.0 * ramps().columns["T"]})
+    plan = Plan.of(make_model("polynomial", features=f"{0.5 + 2.0**-23!r}*T").fit(steep))
+    source = c_source(plan, "q31", [])
+    program = CProgram(source, tmp_path, flags=QUICK)
+    assert c_difference(plan, source, program, 1).inside <= fixed_point_error(plan, source.layout, "q31")
+
+
+@needs_cc
+@pytest.mark.parametrize(
+    ("features", "times"),
+    [("T_in, dT_in[slope, 60 s], diff(T_in)[slope, 40 s]", 1.0), ("dT_in[block, 60 s]", 1000.0)],
+)
+def test_windows_over_bins_stay_within_their_proven_bound(tmp_path, features, times):
+    trained = training_run()
+    trained = Run("steep", trained.columns | {"gyro": times * trained.columns["gyro"]}, trained.facts)
+    plan = Plan.of(make_model("polynomial", features=features).fit(trained), 0.05)
     run, found = fast_run(0.05), {}
     for dtype in ("float64", "q31"):
         source = c_source(plan, dtype, [])
