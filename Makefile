@@ -7,19 +7,20 @@ READY := $(VENV)/.ready
 EXTRAS := xlsx,tdms,mdf,ulog,ros,mcap,miniseed,sweep,cluster,export,test
 # Two workers share two cores: threads of their own would wait for each other.
 TESTED := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-PIP := $(BIN)/python -m pip --disable-pip-version-check
+# Python compiles a module when it is first loaded: most of what packages bring never is.
+INSTALL := $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-compile -c constraints.txt
 
 .PHONY: demo test oldest newest docs lint format benchmarks clean
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) install --quiet --upgrade -c constraints.txt pip setuptools
-	$(PIP) install --quiet -c constraints.txt torch
-	$(PIP) install --quiet -c constraints.txt -e '.[$(EXTRAS)]'
+	$(INSTALL) --upgrade pip setuptools
+	$(INSTALL) torch
+	$(INSTALL) -e '.[$(EXTRAS)]'
 	touch $(READY)
 
 $(VENV)/.docs: $(READY)
-	$(PIP) install --quiet -c constraints.txt -e '.[docs]'
+	$(INSTALL) -e '.[docs]'
 	touch $@
 
 ## Train on one leg of a real thermal cycle, judge on another, and say which page to open.

@@ -155,7 +155,7 @@ class Rehearsal(ExpectedRuns):
         run = model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns).run
         # What a run of it would give is no matter, and without noise might pass for a stuck output.
         run = run.with_columns(gyro=np.where(np.isfinite(run.gyro), 0.0, np.nan))
-        self.rows = rows = rows_of(run, model.twin, len(run), exact=True)
+        self.rows = rows = rows_of(run, model.twin, round(run.span_s / sample_s) + 1, exact=True)
         self._values = on.values
         self._whitener = whitener_of(on.noise, rows)
         reading = _reading_noise(rows, on.sensors, on.values)
