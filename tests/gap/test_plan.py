@@ -34,6 +34,13 @@ def rehearsed():
     return on, Rehearsal(on, Family(), SHORT, FINE_S)
 
 
+def test_rows_are_as_long_where_the_power_goes_off_for_a_while(rehearsed):
+    on, rehearsal = rehearsed
+    paused = Rehearsal(on, Family(), replace(SHORT, power_steps="each"), FINE_S).rows
+    assert len(paused.run) < round(paused.run.span_s / FINE_S) + 1
+    assert paused.row_s == rehearsal.rows.row_s == FINE_S
+
+
 def test_information_is_that_of_the_replay_and_the_dense_covariance(rehearsed):
     on, rehearsal = rehearsed
     of = unknowns(on, ["thermal_hysteresis", "shupe_pure", "k1"])
