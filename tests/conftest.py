@@ -1,6 +1,6 @@
 """What all tests share: hypothesis repeats itself, taking its time; noise of a series is fitted once.
 
-Libraries and tests, once loaded, are passed over by the garbage collector: going through them took 5 % of the time.
+Libraries and tests, once loaded, are passed over by the garbage collector: going through them takes time.
 """
 
 from __future__ import annotations
