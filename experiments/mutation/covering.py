@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -95,8 +96,10 @@ def tests_that_import(root: Path, path: str) -> list[str]:
     """Test files that import a file's module, else one that imports it: kernels' lines are not measured."""
 
     def importing(path: str, folder: str) -> list[str]:
-        told = f"from {path.removesuffix('.py').replace('/', '.')} import"
-        found = [file for file in (root / folder).rglob("*.py") if told in file.read_text("utf-8")]
+        *parents, name = path.removesuffix(".py").split("/")
+        package = re.escape(".".join(parents))
+        told = re.compile(rf"from {package}\.{name} import|from {package} import (\([^)]*|.*)\b{name}\b")
+        found = [file for file in (root / folder).rglob("*.py") if told.search(file.read_text("utf-8"))]
         return [file.relative_to(root).as_posix() for file in found]
 
     tests = importing(path, "tests") or [

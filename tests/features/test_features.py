@@ -13,6 +13,7 @@ from sklearn.pipeline import make_pipeline
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
+from fogml.features.signal import Signal
 from fogml.runs.run import Run
 
 
@@ -190,3 +191,20 @@ def test_blocks_keep_bounded_history(run: Run) -> None:
         values = blocks.push(run[low : low + 10]).values
         np.testing.assert_allclose(values, whole[low : low + 10], rtol=1e-9, atol=1e-12)
         assert blocks._history is not None and len(blocks._history) <= 43
+
+
+def test_a_signal_is_the_sum_that_it_says_and_a_view_of_one_column(run: Run) -> None:
+    one = Signal.of("T1").values(run)
+    assert np.shares_memory(one, run.columns["T1"])
+    for first, other in ((1.0, -1.0), (1.1, -1.1), (1.0, 0.5)):
+        found = Signal.of({"T1": first, "T2": other}).values(run)
+        np.testing.assert_allclose(found, first * run.columns["T1"] + other * run.columns["T2"])
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [("T", True), ("lag(T, 300 s)", True), ("dT[slope, 60 s]", False), ("diff(T)[exp, 60 s]", False)],
+)
+def test_a_value_at_rest_is_told_by_its_signal_where_it_is_no_rate(text: str, told: bool) -> None:
+    (atom,) = parse_features(text).atoms
+    assert atom.of_input_at_rest is told

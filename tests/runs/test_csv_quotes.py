@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from fogml.errors import InputError
 from fogml.runs.csv_quotes import quotes_are_plain
 from fogml.runs.csv_source import CsvSource
+from fogml.runs.logger_lines import hide_quoted, shown
 from fogml.runs.reading import read_blocks, read_run
 
 HEADER = "time [s],gyro [deg/h],note"
@@ -80,3 +81,10 @@ def test_a_header_without_an_end(tmp_path, text):
     path.write_text(text)
     with pytest.raises(InputError, match=r"run\.csv: no line ends within the first 65536 bytes"):
         read_run(path)
+
+
+def test_separators_between_quotation_marks_are_hidden_and_come_back():
+    line = b'1;"a;b";"c";2'
+    hidden = hide_quoted(line, ";")
+    assert hidden.count(b";") == 3 and shown(hidden.decode(), ";") == line.decode()
+    assert hide_quoted(line, None) == line and hide_quoted(b"1;2", ";") == b"1;2"

@@ -7,7 +7,7 @@ import pytest
 
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
-from fogml.runs.dropouts import RULE, read_thermometer
+from fogml.runs.dropouts import RULE, last_reading, read_thermometer
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
@@ -118,3 +118,12 @@ def test_a_mean_that_cancels_is_nothing_rather_than_rounding() -> None:
     run = Run.from_columns(time=np.arange(100.0), gyro=1.0 + turns, rate=turns)
     told = {column["name"]: column["mean"] for column in inspection_json([run])["runs"][0]["columns"]}
     assert told["rate"] == 0.0 and told["gyro"] == pytest.approx(1.0)
+
+
+def test_a_single_reading_after_others_is_judged_by_them():
+    time, values = np.arange(51.0), np.full(51, 25.0)
+    before = last_reading(time[:50], values[:50], read_thermometer(time[:50], values[:50]))
+    for shown, bad in ((25.1, None), (999.0, [True])):
+        found = read_thermometer(time[50:], np.array([shown]), before=before)
+        assert (found.bad if found.bad is None else found.bad.tolist()) == bad
+        assert found.values.tolist() == [25.0 if bad else shown]

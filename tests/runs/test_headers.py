@@ -9,7 +9,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.runs.columns import conversion
-from fogml.runs.header_spelling import canonical_cells
+from fogml.runs.header_spelling import canonical_cells, with_units_below
 from fogml.runs.reading import read_blocks, read_run
 
 COUNT = 30
@@ -256,3 +256,14 @@ def test_a_row_cut_short_is_no_footer(tmp_path):
     path.write_text(lines(below=["15.0"]))
     with pytest.raises(InputError, match="line 32"):
         read_run(path)
+
+
+@pytest.mark.parametrize(
+    ("row", "right"),
+    [
+        (["s", "deg/h", "as shown"], ("time [s]", "gyro [deg/h]", "place [as shown]")),
+        (["s", "what it says", "as shown"], None),
+    ],
+)
+def test_a_row_of_words_is_one_of_units_where_two_columns_accept_theirs(row, right):
+    assert with_units_below(["time", "gyro", "place"], row) == right

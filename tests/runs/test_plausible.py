@@ -8,9 +8,10 @@ import pytest
 from fogml.errors import InputError
 from fogml.models.names import make_model
 from fogml.runs.checks import check_run
+from fogml.runs.columns import column_spec
 from fogml.runs.facts import Facts
 from fogml.runs.findings import FIRST_OF_ALL
-from fogml.runs.plausible import implausible
+from fogml.runs.plausible import FACTORS, implausible
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_names, shipped_run
 
@@ -82,3 +83,18 @@ def test_compensating_twice_is_refused():
         with pytest.raises(InputError, match="run: compensated already"):
             model.compensate(again)
     assert [finding.code for finding in implausible(stated)][:1] == ["already_compensated"]
+
+
+@pytest.mark.parametrize("words", FACTORS)
+def test_a_unit_taken_for_another_is_off_by_what_one_is_in_the_other(words):
+    true, taken = words.split(" taken for ")
+    units = column_spec("gyro").units
+    # What is read as one of the wrong unit is one of the right one.
+    assert FACTORS[words] == pytest.approx(units[taken][0] / units[true][0])
+
+
+@pytest.mark.parametrize(("middle", "unit"), [(330.0, "kelvin"), (417.0, "raw counts")])
+def test_a_coil_in_kelvin_is_not_beyond_what_a_gyro_stands(middle, unit):
+    run = Run("run", columns(T_in=middle + np.linspace(-10.0, 10.0, ROWS)), FACTS)
+    (found,) = [finding for finding in implausible(run) if finding.code == "implausible_temperature"]
+    assert unit in found.message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.regimes import Regimes, regimes
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
+from fogml.runs.temperature_motion import _resumptions
 
 STEPS = [(30, 25.0), (90, -40.0), (90, 60.0), (60, 25.0)]
 """Minutes of soak at a temperature, one after another, ramps between."""
@@ -281,3 +283,16 @@ def test_any_staircase_is_covered_and_told(levels, soak, rate, sample_s, seed):
     assert all(a[2] == b[1] and a[0] != b[0] for a, b in pairwise(segments))
     assert {name for name, *_ in segments} <= set(Regimes.names)
     check(run, truth, 1.5 + 4 * sample_s / 60 + 0.3 / rate)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "taken_up"),
+    [((1.0, 0.4, 1.0), 1), ((1.0, 0.53, 1.2), 0), ((1.0, 0.2, 0.52), 1), ((1.0, 0.2, 0.45), 0)],
+)
+@pytest.mark.parametrize("last", [60.0, 600.0])
+def test_a_move_is_taken_up_again_from_less_than_half_its_speed_to_more(speeds, taken_up, last):
+    corners = np.cumsum([0.0, 600.0, 600.0, last])
+    time = np.arange(0.0, corners[-1] + 1.0, 5.0)
+    course = np.interp(time, corners, np.cumsum([0.0, *(0.05 * np.array(speeds) * np.diff(corners))]))
+    found = _resumptions(SimpleNamespace(time=time), course, 0, len(time))
+    assert len(found) == taken_up and all(600.0 <= time[place] <= 1200.0 for place in found)

@@ -110,6 +110,15 @@ def test_a_restarted_clock_makes_legs(tmp_path, second):
     assert counts(first) == {"repaired_restart": 1}
 
 
+def test_rows_that_repeat_a_time_within_a_leg_are_not_out_of_place(tmp_path):
+    leg = 0.1 * np.arange(600)
+    again = np.where((leg > 10.05) & (leg < 10.35), leg[100], leg)
+    path = file_of(tmp_path, ".csv", np.concatenate([leg + 300.0, again]), np.arange(1200.0))
+    first, other = read_runs(path, repair=True)
+    assert (len(first), len(other)) == (600, 597)
+    assert counts(first) == counts(other) == {"repaired_restart": 1, "repaired_repeats": 3}
+
+
 def test_blocks_of_rows_out_of_place_are_sorted(tmp_path):
     order = np.concatenate([np.arange(300), np.arange(500, 900), np.arange(300, 500), np.arange(900, 1000)])
     run = read_run(file_of(tmp_path, ".csv", 0.5 * order, order * 1.0), repair=True)
