@@ -16,7 +16,7 @@ from fogml.errors import InputError
 from fogml.lab.acceptance import acceptance_json
 from fogml.lab.acceptance_rows import QUANTITIES, read_limits
 from fogml.models.names import make_model
-from fogml.report.acceptance_page import acceptance_page, limit_words
+from fogml.report.acceptance_page import acceptance_page, limit_words, named
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
@@ -136,6 +136,12 @@ def test_faults_of_a_limits_file_are_named(tmp_path, text, told):
     path.write_text(text)
     with pytest.raises(InputError, match=told):
         read_limits(path)
+
+
+def test_a_gyro_is_named_by_what_is_known_of_it():
+    assert named({"serial_number": "FOG-0417", "axis": "z"}) == "FOG-0417, axis z"
+    assert named({"serial_number": "FOG-0417", "axis": None}) == "FOG-0417"
+    assert named({"serial_number": None, "axis": "z"}) == "unit not stated, axis z"
 
 
 def test_limits_in_words():

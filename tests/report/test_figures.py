@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 import pytest
+from scipy.stats import chi2
 
 from fogml.report.compare_page import residuals_in_time, rms_bars
+from fogml.report.figures_gap import _parted
+from fogml.report.figures_gap_evidence import variance_ratios
 from fogml.report.figures_judgement import (
+    DRAWN_POINTS,
     direction_of,
     drift_against_temperature,
     drift_in_time,
     rms_by_regime,
 )
 from fogml.report.figures_noise import term_deviation
-from fogml.report.index_page import loop_between
+from fogml.report.figures_plan import programme_drawing
+from fogml.report.index_page import loop_between, loops
 from fogml.report.inspect_page import temperature_rates
 from fogml.report.page import Drawing
 from fogml.report.style import segments_of, shade
@@ -53,6 +59,8 @@ def test_flagged_averages_are_marked_and_unflagged_are_not() -> None:
     run = judged_run(outside=0.2)
     assert len(marked.x) == int((run.series.flag == 1).sum()) > 0
     assert "outside training" not in traces(drift_in_time(judged_run()))
+    many = traces(drift_in_time(judged_run(n=20 * DRAWN_POINTS, outside=0.9)))["outside training"]
+    assert 0 < len(many.x) <= DRAWN_POINTS
 
 
 def test_warming_and_cooling_are_drawn_apart() -> None:
@@ -62,6 +70,8 @@ def test_warming_and_cooling_are_drawn_apart() -> None:
     assert np.mean(by_name["warming"].y) - np.mean(by_name["cooling"].y) > 0.4
     counts = {name: len(by_name[name].x) for name in ("warming", "cooling", "steady")}
     assert sum(counts.values()) == len(run.series.time)
+    # The model stands with what it was fitted to, and not with what it left.
+    assert np.ptp(by_name["model"].y) == pytest.approx(np.ptp(run.series.before - run.series.after), rel=0.05)
 
 
 def test_directions_by_the_dead_band() -> None:
@@ -219,3 +229,40 @@ def test_long_serial_numbers_are_written_by_where_they_differ() -> None:
         axis = figure.layout.xaxis
         assert list(axis.ticktext) == texts and list(axis.tickvals) == labels
         assert axis.title.text == title
+
+
+def test_what_stands_above_each_other_shares_its_axis() -> None:
+    layout = loops({"x": judgement(), "y": judgement()}).figure.layout
+    assert (layout.xaxis.matches, layout.xaxis2.matches) == ("x3", "x4")
+
+
+def test_table_rates_are_drawn_odd_about_rest_and_over_the_time_of_the_temperatures() -> None:
+    times = {"time_s": [0.0, 1800.0, 1800.0, 3600.0]}
+    rates = times | {"value": [0.0, 0.0, 9.999, -9.999]}
+    profile = {"set_point": times | {"value": [20.0] * 4}, "coil": times | {"value": [20.0] * 4}}
+    run = {"profile": profile | {"table_rate": rates}, "hours": 1.0, "summary": "a soak"}
+    figure = programme_drawing(run).figure
+    assert figure.layout.xaxis.matches == "x2"
+    shown = traces(programme_drawing(run))["table rate"]
+    assert shown.yaxis == "y2" and shown.y == pytest.approx([0.0, 0.0, 4.0, -4.0])
+    ticks = dict(zip(figure.layout.yaxis2.ticktext, figure.layout.yaxis2.tickvals, strict=True))
+    assert ticks["0"] == 0.0 and ticks["1"] == pytest.approx(-ticks["−1"])
+
+
+def test_the_band_of_variance_ratios_is_what_chance_makes_about_one() -> None:
+    noise: Any = SimpleNamespace(scales_s=[10.0, 20.0, 40.0], variance_ratio=[1.0, 1.1, 0.9], samples=4000)
+    band, shown = variance_ratios(noise).figure.data
+    assert list(shown.y) == noise.variance_ratio
+    low, high = np.asarray(band.y)[:3], np.asarray(band.y)[:2:-1]
+    blocks = 4000.0 / np.array([1.0, 2.0, 4.0])
+    of_chance = np.sort([chi2.ppf(p, blocks) / blocks for p in (0.025, 0.975)], axis=0)
+    np.testing.assert_allclose(np.sort([low, high], axis=0), of_chance, atol=0.005)
+
+
+def test_where_warming_and_cooling_part_is_where_both_were_seen() -> None:
+    bins: Any = [
+        SimpleNamespace(from_degc=low, to_degc=low + 10.0, mean_up=up, mean_down=down)
+        for low, up, down in ((0.0, 0.1, 0.2), (10.0, 0.5, 0.1), (20.0, 9.0, None), (30.0, None, -9.0))
+    ]
+    assert "from 10.0 to 20.0 °C: 0.400 deg/h" in _parted(bins)
+    assert "in both directions" in _parted(bins[2:])

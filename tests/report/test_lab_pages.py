@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,14 +16,22 @@ from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.north_positions import simulated_positions
 from fogml.report import misalignment_page, north_page, train_page
+from fogml.report.misalignment_page import slopes_over_tilts
 from tests.report.judgements import judgement
 from tests.report.pages import Page
 
 UNIT = TableUnit(1.2345, 5.0, 3.0, 0.5)
 
 
-def misalignment(tilts: tuple[float, ...] = (0.0, 30.0, 60.0, 90.0), rates=(-10.0, 10.0)) -> str:
-    return misalignment_page(finite_json(misalignment_json(measurements(UNIT, tilts, rates, noise=1e-4))))
+TILTS = (0.0, 30.0, 60.0, 90.0)
+
+
+def misalignment_values(tilts: tuple[float, ...] = TILTS, rates=(-10.0, 10.0)) -> dict[str, Any]:
+    return finite_json(misalignment_json(measurements(UNIT, tilts, rates, noise=1e-4)))
+
+
+def misalignment(tilts: tuple[float, ...] = TILTS, rates=(-10.0, 10.0)) -> str:
+    return misalignment_page(misalignment_values(tilts, rates))
 
 
 def recorded() -> str:
@@ -93,3 +102,14 @@ def test_without_standard_errors_the_page_says_so() -> None:
 
 def test_train_page_without_navigation_has_no_such_part() -> None:
     assert "costs in navigation" not in train_page(judgement())
+
+
+def test_slopes_stand_above_what_their_fit_leaves_over_the_same_tilts() -> None:
+    values = misalignment_values()
+    figure = slopes_over_tilts(values).figure
+    assert figure.layout.xaxis.matches == "x2"
+    marks = [trace for trace in figure.data if trace.mode == "markers"]
+    assert {trace.yaxis for trace in marks} == {"y", "y2"}
+    for state in values["states"]:
+        slopes = next(trace for trace in marks if trace.name == f"state {state['state']}")
+        assert (slopes.yaxis, list(slopes.y)) == ("y", state["slopes"])

@@ -183,6 +183,8 @@ def test_the_comparison_is_sorted_and_names_the_choice_and_the_harm() -> None:
     assert ranked(models)[-2:] == ["mean", "M2"]
     text = Page(compare_page(models, {"joint": "the table did not turn"})).text
     assert "auto chose rbf (T, dT, T*dT)" in text
+    # Parameters and bytes of each, in its row.
+    assert text.count(" 41 344 ") == len(models)
     assert "Worse than no drift model (mean): M2." in text
     assert "joint the table did not turn" in text
     assert len(re.findall("✗ not met", text)) == 2
