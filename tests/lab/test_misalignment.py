@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fogml.errors import InputError
-from fogml.lab.misalignment import TableMeasurements, decouple
+from fogml.lab.misalignment import TableMeasurements, _slopes, decouple
 from fogml.lab.misalignment_methods import compare_methods, relative_error_ppm
 from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
@@ -248,3 +248,11 @@ def test_too_little_is_refused(tilts, states, cross, message: str) -> None:
     )
     with pytest.raises(InputError, match=message):
         decouple(part, cross)
+
+
+def test_what_is_even_in_the_rate_is_neither_slope_nor_left_over() -> None:
+    rates = np.array([-10.0, 0.0, 10.0, -5.0, 5.0])
+    measured = TableMeasurements(np.ones(5), np.zeros(5), rates, 2.0 * rates + 0.7, "deg/h")
+    found = _slopes(measured, 1)
+    assert found.values == pytest.approx([2.0])
+    assert (found.squares, found.dof) == (pytest.approx(0.0, abs=1e-20), 3)

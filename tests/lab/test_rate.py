@@ -195,3 +195,5 @@ def test_facts_of_the_unit_follow_from_its_coil() -> None:
     assert facts["fringe_deg_s"] == pytest.approx(math.degrees(2.0 * math.pi / sagnac))
     assert facts["transit_us"] == pytest.approx(1e6 * 1.4525 * 2000.0 / 299_792_458.0)
     assert facts["proper_frequency_khz"] == pytest.approx(500.0 / facts["transit_us"])
+    # As the catalogue has it for the reference coil, 20 uW and a depth of pi / 2.
+    assert unit_facts(Twin())["photon_walk_deg_sqrt_h"] == pytest.approx(1.89e-3, abs=5e-6)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from decimal import Decimal
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +14,7 @@ from hypothesis import strategies as st
 from fogml.report import words
 from fogml.report.style import log_axis, rounded_up, time_unit
 from fogml.report.tables import Table, coefficients_table
-from fogml.static_svg import ticks
+from fogml.static_svg import braille, ticks
 
 
 @pytest.mark.parametrize(
@@ -110,3 +112,10 @@ def test_a_table_of_terms_of_the_output_says_what_they_add_up_to() -> None:
 def test_no_column_of_a_table_goes_without_a_heading() -> None:
     with pytest.raises(ValueError, match="column 2 of the table 'Terms' has no heading"):
         Table((("Term", "", "text"), (" ", "", "figure")), (), "Terms")
+
+
+def test_a_curve_of_dots_rises_from_left_to_right() -> None:
+    (line,) = braille(np.arange(4.0), width=2, height=1)
+    assert [unicodedata.name(sign) for sign in line] == [
+        f"BRAILLE PATTERN DOTS-{dots}" for dots in ("67", "24")
+    ]
