@@ -13,6 +13,7 @@ import pytest
 from fogml.blind.first.effects.electrical import Crosstalk
 from fogml.blind.first.effects.invented import HotBursts
 from fogml.blind.first.effects.turning import HuntingServo
+from fogml.blind.first.programme import _chamber_path
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Additive
 from fogml.blind.frame.noise import StateNoise
@@ -105,3 +106,14 @@ def test_equal_variances_in_each_half_decade_are_the_flicker_that_is_told() -> N
     variances = np.full(13, 0.02**2 / np.pi * np.log(np.sqrt(10.0)))
     told = StateNoise(0.003, variances, taus_s, 0.001).amounts()
     assert told["B"][0] == pytest.approx(0.02, rel=0.03)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_soaks_of_a_programme_last_and_the_chamber_stays_in_them(seed: int) -> None:
+    corners, points, soaks = _chamber_path(np.random.default_rng(seed), 36_000.0, False)
+    assert np.all(np.diff(corners) > 0.0) and soaks
+    for begin, end in soaks:
+        first, last = np.interp([begin, end], corners, points)
+        assert 300.0 <= end - begin <= 6600.0 and first == last
+    rates = np.abs(np.diff(points)) / np.diff(corners) * 60.0
+    assert np.all((rates == 0.0) | ((rates > 0.29) & (rates < 3.01)))

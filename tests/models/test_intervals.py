@@ -7,7 +7,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.models.feature_model import FeatureModel
-from fogml.models.intervals import Intervals, intervals_from_residuals
+from fogml.models.intervals import LEVELS, Intervals, half_widths_of_runs, intervals_from_residuals
 from fogml.models.names import make_model
 from fogml.testing.models import synthetic_run
 
@@ -84,3 +84,10 @@ def test_round_trip_and_bad_values():
         intervals.half_width(1.0)
     with pytest.raises(InputError, match="too short"):
         intervals_from_residuals([], 50.0, "time blocks")
+
+
+def test_nine_runs_are_just_enough_for_nine_tenths():
+    """The tenth run exceeds the largest of nine in one case of ten."""
+    half = half_widths_of_runs([np.full(20, float(k)) for k in range(1, 10)])
+    assert half[LEVELS.index(0.9)] == 9.0 and half[LEVELS.index(0.5)] == 5.0
+    assert half[LEVELS.index(0.95)] > 9.0

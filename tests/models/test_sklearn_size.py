@@ -7,6 +7,7 @@ import pytest
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
 from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import LinearRegression
 from sklearn.neural_network import MLPRegressor
@@ -15,6 +16,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVR
 
 from fogml.models.regressors import parameter_count, weight_bytes
+from fogml.models.sklearn_compact import network_of_sklearn
 
 X = np.random.default_rng(0).normal(size=(60, 3))
 Y = X @ [1.0, 2.0, 3.0]
@@ -54,3 +56,21 @@ def test_a_pipeline_is_as_large_as_what_it_is_made_of() -> None:
     wrapped = TransformedTargetRegressor(inside, transformer=StandardScaler()).fit(X, Y)
     assert parameter_count(wrapped) == parameter_count(LinearRegression().fit(X, Y)) == 3 + 1
     assert weight_bytes(wrapped) == 8 * (3 + 1)
+
+
+@pytest.mark.parametrize(
+    "kernel",
+    [
+        RBF(1.3),
+        DotProduct(1.5),
+        RBF([0.7, 1.0, 3.0]) + DotProduct(1.5) + ConstantKernel(0.3) + WhiteKernel(0.1),
+    ],
+    ids=str,
+)
+def test_a_process_is_the_network_that_it_is_exported_as(kernel) -> None:
+    process = GaussianProcessRegressor(kernel, optimizer=None, alpha=1e-3, normalize_y=True)
+    scaled = TransformedTargetRegressor(
+        make_pipeline(StandardScaler(), process), transformer=StandardScaler()
+    )
+    scaled.fit(X, np.exp(0.3 * Y))
+    np.testing.assert_allclose(network_of_sklearn(scaled)(X), scaled.predict(X), atol=1e-9)
