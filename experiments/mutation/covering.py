@@ -96,7 +96,7 @@ def tests_that_import(root: Path, path: str) -> list[str]:
     """Test files that import a file's module, else one that imports it: kernels' lines are not measured."""
 
     def importing(path: str, folder: str) -> list[str]:
-        *parents, name = path.removesuffix(".py").split("/")
+        *parents, name = path.removesuffix(".py").removesuffix("/__init__").split("/")
         package = re.escape(".".join(parents))
         told = re.compile(rf"from {package}\.{name} import|from {package} import (\([^)]*|.*)\b{name}\b")
         found = [file for file in (root / folder).rglob("*.py") if told.search(file.read_text("utf-8"))]
