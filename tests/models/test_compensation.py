@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from sklearn.neighbors import KNeighborsRegressor
 
 from fogml.errors import InputError
+from fogml.models.card import check_unit_and_axis
 from fogml.models.compensation import compensate_blocks
 from fogml.models.feature_model import FeatureModel
 from fogml.models.names import make_model
@@ -134,3 +136,26 @@ def test_memory_does_not_grow_with_the_recording(train):
 
     peak(2)
     assert peak(30) < 1.2 * peak(3)
+
+
+@pytest.mark.parametrize("fact", ["unit", "axis"])
+@pytest.mark.parametrize(
+    ("trained", "found", "told"),
+    [
+        ("A", "A", ()),
+        (None, None, ()),
+        ("A", None, ("run states no {}",)),
+        (None, "A", ("the model states no {}",)),
+        ("A", "B", ("run: {} 'B', but the model was trained on {} 'A': applied",)),
+    ],
+)
+def test_whether_model_and_run_belong_together(fact, trained, found, told):
+    card = SimpleNamespace(**{"unit": None, "axis": None, "earth_known": False, fact: trained})
+    run = SimpleNamespace(name="run", earth_known=False, facts=SimpleNamespace(unit=None, axis=None))
+    setattr(run.facts, fact, found)
+    notes = check_unit_and_axis(card, run, any_unit=True)
+    assert len(notes) == len(told)
+    assert all(note.startswith(words.replace("{}", fact)) for note, words in zip(notes, told))
+    if trained and found and trained != found:
+        with pytest.raises(InputError, match=f"use a model of this {fact}"):
+            check_unit_and_axis(card, run, any_unit=False)

@@ -122,7 +122,9 @@ def test_share_of_independent_rows_is_that_of_the_process(memory: float) -> None
     noise = np.zeros_like(steps)
     for i in range(1, len(steps)):
         noise[i] = memory * noise[i - 1] + steps[i]
-    assert independent_share(noise) == pytest.approx((1.0 - memory) / (1.0 + memory), rel=0.15)
+    for level in (0.0, 3.0):
+        found = independent_share(noise + level)
+        assert found == pytest.approx((1.0 - memory) / (1.0 + memory), rel=0.15)
 
 
 def test_share_of_nothing_is_one() -> None:
