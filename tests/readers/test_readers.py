@@ -215,6 +215,14 @@ def test_timestamps_of_pandas_in_parquet(tmp_path, zone):
     np.testing.assert_allclose(np.concatenate([block.time for block in blocks]), TIME, atol=1e-9)
 
 
+def test_stamps_of_numpy_count_from_the_first(tmp_path):
+    stamps = np.datetime64(1000 * files.START_S, "ms") + np.round(1000.0 * TIME).astype("timedelta64[ms]")
+    np.savez(tmp_path / "log.npz", time=stamps, **{"gyro [deg/h]": GYRO, "T [degC]": WARM})
+    run = read_run(tmp_path / "log.npz")
+    np.testing.assert_allclose(run.time, TIME, atol=1e-3)
+    assert run.facts.started == STARTED
+
+
 def test_a_struct_of_matlab(tmp_path):
     from scipy.io import savemat
 
