@@ -89,21 +89,20 @@ class ParquetColumn:
                 part, self.ahead = part[: stop - self.at], part[stop - self.at :]
             skipped = min(max(start - self.at, 0), len(part))
             self.at += len(part)
+            if self.at == self.shape[0]:
+                self.batches = iter(())  # what it took is there for the next column
             yield part[skipped:]
 
-    def __getitem__(self, part: tuple[slice]) -> np.ndarray[Any, Any]:
-        start, stop = part[0].start, part[0].stop
-        found, at = np.empty(stop - start), 0
+    def samples(self, start: int, stop: int) -> Iterator[np.ndarray[Any, Any]]:
+        """The rows from `start` to `stop` as numbers, piece by piece."""
         for piece in self.parts(start, stop):
             if self.is_stamp:
                 since = nanoseconds(piece).fill_null(self.first_ns).to_numpy(zero_copy_only=False)
                 held = np.where(piece.is_null().to_numpy(zero_copy_only=False), np.nan, since - self.first_ns)
-                found[at : at + len(piece)] = held / 1e9
+                yield held / 1e9
             else:
                 # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
-                found[at : at + len(piece)] = piece.cast("float64", safe=False).to_numpy(zero_copy_only=False)
-            at += len(piece)
-        return found
+                yield piece.cast("float64", safe=False).to_numpy(zero_copy_only=False)
 
     def marks(self, most: int) -> tuple[list[str], np.ndarray[Any, Any]]:
         """The different texts of a column, at most so many, and the place of each row's among them."""

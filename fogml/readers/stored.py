@@ -236,11 +236,14 @@ def is_dataset(value: Any) -> bool:
     return hasattr(value, "is_virtual")
 
 
-def samples(array: Any, start: int, stop: int) -> np.ndarray[Any, Any]:
-    """Samples of a vector along its only long axis, float64."""
+def samples(array: Any, start: int, stop: int) -> Iterator[np.ndarray[Any, Any]]:
+    """Samples of a vector along its only long axis, float64, in pieces as they are read."""
+    if hasattr(array, "samples"):
+        yield from array.samples(start, stop)
+        return
     along = max(range(array.ndim), key=lambda axis: array.shape[axis])
     part = tuple(slice(start, stop) if axis == along else 0 for axis in range(array.ndim))
-    return np.ascontiguousarray(array[part], dtype=np.float64)
+    yield np.ascontiguousarray(array[part], dtype=np.float64)
 
 
 def text_of(value: Any) -> str:

@@ -5,14 +5,11 @@ Nothing is changed; each finding says where and how much.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from itertools import chain
+from collections.abc import Iterator
 
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
-from fogml.processes import available_cores
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
@@ -63,17 +60,12 @@ def check_run(run: Run) -> tuple[Finding, ...]:
     if len(run) < 2:
         return ()
     parts = (implausible, _dropouts, _gaps, _irregular, _stuck, _saturated, _outliers, _span)
-
-    def look(part: Callable[[Run], Iterator[Finding]]) -> tuple[Finding, ...]:
-        with np.errstate(over="ignore", invalid="ignore"):  # values near the greatest float
-            found = tuple(part(run))
-        large.release()
-        return found
-
-    if len(run) <= large.PIECE:
-        return tuple(chain.from_iterable(map(look, parts)))
-    with ThreadPoolExecutor(available_cores()) as beside:
-        return tuple(chain.from_iterable(beside.map(look, parts)))
+    found: list[Finding] = []
+    with np.errstate(over="ignore", invalid="ignore"):  # values near the greatest float
+        for part in parts:
+            found += part(run)
+            large.release()
+    return tuple(found)
 
 
 def _dropouts(run: Run) -> Iterator[Finding]:

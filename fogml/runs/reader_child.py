@@ -3,8 +3,8 @@
 The libraries behind these formats are written for sound files: a damaged one may end the process, hang it
 or take all memory. Here that ends no more than this process. It needs the standard library, NumPy, the module
 of the format's reader and the package behind it alone, so that it starts quickly. Requests come as lines of
-JSON on standard input; each is answered by a line of JSON on standard output, and for samples by their bytes
-after it.
+JSON on standard input; each is answered by a line of JSON on standard output, and samples by several lines,
+each with the bytes of some of them after it.
 """
 
 from __future__ import annotations
@@ -15,8 +15,11 @@ import importlib
 import json
 import os
 import sys
+import threading
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
+from queue import Queue
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,29 +70,34 @@ def end_with_parent(parent: int) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def answer(request: dict[str, Any], files: dict[int, Any]) -> tuple[dict[str, Any], bytes | memoryview]:
-    """The answer to a request, and the bytes after it."""
+def answers(
+    request: dict[str, Any], files: dict[int, Any]
+) -> Iterator[tuple[dict[str, Any], bytes | memoryview]]:
+    """The answer to a request, and the bytes after it; samples in several parts, sent as they are read."""
     number = int(request["file"])
     limit_time(request["cpu_s"])
     if request["do"] == "close":
         files.pop(number).close()
-        return {}, b""
-    if request["do"] == "open":
+        yield {}, b""
+    elif request["do"] == "open":
         # What a reader needs is loaded before memory is limited.
         kind = reader(request["reader"], request["package"])
         limit_memory(request["memory"])
         files[number] = kind(request["path"], request["keys"])
-        return files[number].told, b""
-    array = files[number].arrays[request["array"]]
-    names: list[str] = []
-    if request["do"] == "text":
-        part = array.text(request["start"], request["stop"])
-        return {"count": len(part), "names": names}, part.data
-    if request["do"] == "marks":
-        names, found = array.marks(request["most"])
+        yield files[number].told, b""
     else:
-        found = reader("fogml.readers.stored:samples", "numpy")(array, request["start"], request["stop"])
-    return {"count": len(found), "names": names}, found.data.cast("B") if len(found) else b""
+        array = files[number].arrays[request["array"]]
+        names: list[str] = []
+        if request["do"] == "text":
+            parts = [array.text(request["start"], request["stop"])]
+        elif request["do"] == "marks":
+            names, codes = array.marks(request["most"])
+            parts = [codes]
+        else:
+            samples = reader("fogml.readers.stored:samples", "numpy")
+            parts = samples(array, request["start"], request["stop"])
+        for part in parts:
+            yield {"count": len(part), "names": names}, part.data.cast("B") if len(part) else b""
 
 
 def main(parent: int) -> None:
@@ -101,21 +109,34 @@ def main(parent: int) -> None:
     sys.path.append(str(ROOT))
     output = sys.stdout.buffer
     sys.stdout = sys.stderr  # whatever a library prints is no answer
+    ready: Queue[tuple[bytes, bytes | memoryview]] = Queue(1)
+
+    def write() -> None:
+        try:
+            while True:
+                output.writelines(ready.get())
+                output.flush()
+        finally:
+            os._exit(1)  # nobody listens any more
+
+    # What is read next is read while this is written.
+    threading.Thread(target=write, daemon=True).start()
+
+    def send(told: dict[str, Any], content: bytes | memoryview = b"") -> None:
+        ready.put((json.dumps(told).encode() + b"\n", content))
+
     for line in sys.stdin.buffer:
         try:
-            told, content = answer(json.loads(line), files)
+            for told, content in answers(json.loads(line), files):
+                send(told, content)
         except MemoryError:
-            told, content = {"memory": True}, b""
+            send({"memory": True})
         except OSError as error:
             reason = error.strerror or str(error)
-            key = "room" if error.errno in NO_ROOM else "fault"
-            told, content = {key: reason[:500]}, b""
+            send({"room" if error.errno in NO_ROOM else "fault": reason[:500]})
         except Exception as error:  # libraries raise whatever the damage leads to
             reason = next(iter(str(error).splitlines()), type(error).__name__)
-            told, content = {"fault": reason[:500]}, b""
-        output.write(json.dumps(told).encode() + b"\n")
-        output.write(content)
-        output.flush()
+            send({"fault": reason[:500]})
 
 
 if __name__ == "__main__":

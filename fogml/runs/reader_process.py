@@ -87,7 +87,8 @@ class StoredFile:
             If the file is damaged there.
         """
         values = np.empty(stop - start, dtype=np.float64)
-        self.ask({"do": "read", "array": array.index, "start": start, "stop": stop}, values)
+        if len(values):
+            self.ask({"do": "read", "array": array.index, "start": start, "stop": stop}, values)
         return values
 
     def marks(self, array: StoredArray, most: int = MOST_NAMES) -> NDArray[np.str_]:
@@ -245,19 +246,32 @@ class ReaderProcess:
         try:
             self._process.stdin.write(json.dumps(request).encode() + b"\n")
             self._process.stdin.flush()
-            line = self._process.stdout.readline(_LONGEST_ANSWER)
-            told: dict[str, Any] = json.loads(line) if line.endswith(b"\n") else {}
-            done = bool(line.endswith(b"\n"))
-            if done and into is not None and "count" in told:
-                done = told["count"] == len(into) and self._fill(into)
-            return told if done else None
-        except (OSError, ValueError, RecursionError):
+            told, filled = self._told(), 0
+            while into is not None and "count" in told:
+                part = into[filled : filled + told["count"]]
+                filled += len(part)
+                if len(part) != told["count"] or not self._fill(part):
+                    return None
+                if filled == len(into):
+                    break
+                told = self._told()
+            done = True
+            return told
+        except (OSError, ValueError, TypeError, RecursionError):
             return None
         finally:
             clock.cancel()
             self.is_alive = done
             if not done:
                 self._end_now()
+
+    def _told(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline(_LONGEST_ANSWER)
+        if not line.endswith(b"\n"):
+            raise ValueError("no whole answer")
+        told: dict[str, Any] = json.loads(line)
+        return told
 
     def _fill(self, into: NDArray[Any]) -> bool:
         assert self._process.stdout is not None

@@ -225,13 +225,15 @@ class TestOutliers:
         assert one(columns, "outliers").row == 778
 
     @settings(max_examples=50, deadline=None)
-    @given(st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=60))
-    def test_the_median_of_five_is_one(self, values):
-        from fogml.runs.outliers import _off_neighbours
+    @given(st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=60), st.integers(0, 60), st.integers(1, 60))
+    def test_the_median_of_five_is_one(self, values, start, size):
+        from fogml.runs.outliers import _less_median
 
         values = np.array(values)
+        part = slice(min(start, len(values) - 1), min(start + size, len(values)))
         windows = sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
-        assert np.array_equal(_off_neighbours(values), values - np.median(windows, axis=1))
+        for at in (part, slice(0, len(values))):
+            assert np.array_equal(_less_median(values, at), (values - np.median(windows, axis=1))[at])
 
     def test_sigma_is_that_of_white_noise(self):
         gyro = np.random.default_rng(0).normal(0.0, 3.0, 200_000)

@@ -181,3 +181,25 @@ def test_the_process_ends_with_its_parent_whatever_it_is_in(tmp_path):
             return
         time.sleep(0.05)
     raise AssertionError("the process lives on")
+
+
+def test_samples_come_in_parts_and_a_fault_among_them_is_told(tmp_path):
+    script = tmp_path / "child.py"
+    script.write_text(
+        "import json, sys\nimport numpy as np\n"
+        "def send(told, *values):\n"
+        "    sys.stdout.buffer.write(json.dumps(told).encode() + b'\\n' + np.array(values).tobytes())\n"
+        "    sys.stdout.buffer.flush()\n"
+        "for line in sys.stdin:\n"
+        "    send({'count': 2}, 1.0, 2.0)\n"
+        "    if (wanted := json.loads(line)['do']) != 'too many':\n"
+        "        send({'fault': 'odd'}) if wanted == 'fault' else send({'count': 1}, 3.0)\n"
+    )
+    process = ReaderProcess(script)
+    values = np.empty(3)
+    assert process.ask({"do": "read"}, values, 60.0) == {"count": 1}
+    assert values.tolist() == [1.0, 2.0, 3.0]
+    assert process.ask({"do": "fault"}, values, 60.0) == {"fault": "odd"}
+    assert process.is_ready()
+    assert process.ask({"do": "too many"}, np.empty(1), 60.0) is None
+    assert not process.is_ready()
