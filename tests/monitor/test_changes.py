@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +12,7 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
 from fogml.errors import InputError
-from fogml.monitor.changes import change_chart
+from fogml.monitor.changes import _change, change_chart
 from fogml.monitor.evidence import ChangePrior, flicker_covariance
 from fogml.signals.random_noise import flicker_noise
 
@@ -154,3 +156,12 @@ def test_what_is_wrong_is_said():
         change_chart({"level": level}, np.arange(5.0), 0.0)
     with pytest.raises(InputError, match="shape"):
         change_chart({"level": level[:3]}, np.arange(5.0), 10.0)
+
+
+def test_an_onset_is_one_of_the_fewest_that_hold_nine_tenths():
+    chart = SimpleNamespace(onset=lambda place: place, size=lambda place, shape: (1.0, 0.1))
+    shares = np.array([0.05, 0.5, 0.41, 0.03, 0.01])
+    logs = {"bias": np.log(np.column_stack([shares, 1e-3 * shares]))}
+    found = _change({"bias": chart}, logs, 9, 2000.0)
+    assert (found.shape, found.onset, found.onset_ci90) == ("step", 1, (1, 2))
+    assert found.probability == pytest.approx(1.0 / 1.001)
