@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from click.testing import CliRunner
 from fogml.benchmark.answers import answer_by, entry_name, read_drift, write_drift
 from fogml.benchmark.make import DriftCase, make_round, write_round
 from fogml.benchmark.rounds import RoundDesign, TrackFolder
-from fogml.benchmark.score import geometric_mean, score_round
+from fogml.benchmark.score import _told_unknown, geometric_mean, score_round
 from fogml.blind.folders import case_files
+from fogml.blind.scoring.answers import NAMED
 from fogml.cli.main import app
 from fogml.errors import InputError
 from fogml.models.names import make_model
@@ -205,3 +207,10 @@ def test_names_and_means() -> None:
     assert entry_name("sklearn.svm.SVR") == "SVR" and entry_name("mine.one:gru") == "gru"
     found = geometric_mean([0.5, 2.0])
     assert found.value == pytest.approx(1.0) and found.n == 2
+
+
+@pytest.mark.parametrize(
+    ("unknown", "wrong", "told"), [(NAMED, "", True), (NAMED, "lag", False), (0.4, "", False)]
+)
+def test_what_is_named_is_called_unknown_from_the_same_probability_on(unknown, wrong, told):
+    assert _told_unknown(SimpleNamespace(unknown=unknown, wrong_name=wrong)) is told

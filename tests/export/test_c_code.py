@@ -431,3 +431,12 @@ def test_any_features(tmp_path, text, seed, dtype):
         # Directions and cubes of first differences magnify the step of a temperature at single samples.
         assert np.median(np.abs(out - expected.compensated)) < 2e-3
         assert np.mean(flag != expected.flag) < 0.02
+
+
+@pytest.mark.parametrize(("name", "unit", "told"), [
+    ("joint", "count", "[count]"), ("joint", "deg/h", "output as rate"), ("M2", "count", "output as rate"),
+])  # fmt: skip
+def test_the_header_says_in_what_the_output_is_given(model_of, name, unit, told):
+    plan = replace(Plan.of(model_of(name)), gyro_unit=unit)
+    header = c_source(plan, "q15", []).files["fogml_model.h"]
+    assert told in next(line for line in header.splitlines() if line.startswith(" *   gyro "))
