@@ -8,6 +8,9 @@ import os
 import pytest
 import yaml
 
+from fogml.cli.fleet_job import batch_of
+from fogml.errors import InputError
+from fogml.fleet.tasks import DONE
 from tests.fleet.units import write_fleet, write_run
 
 pytest.importorskip("optuna", reason="Optuna is not installed: pip install -e '.[sweep]'")
@@ -200,3 +203,10 @@ def test_a_fleet_done_before_is_done_again_where_a_side_file_has_changed(invoke_
     resumed = invoke_json(*arguments, tmp_path / "out")["units"][0]
     assert resumed == invoke_json(*arguments, tmp_path / "anew")["units"][0]
     assert resumed["after"] != first["after"]
+
+
+def test_a_batch_is_of_the_units_that_are_done(tmp_path):
+    unit = {"job": "acceptance", "status": "failed", "folder": "FOG-1"}
+    assert batch_of([unit, {**unit, "job": "train", "status": DONE}], tmp_path) is None
+    with pytest.raises(InputError, match="FOG-1"):
+        batch_of([{**unit, "status": DONE}], tmp_path)

@@ -78,3 +78,16 @@ def test_a_disk_that_fills_in_the_middle_keeps_the_finished_trials(tmp_path):
     assert JournalStorage(WholeLines(str(tmp_path / JOURNAL))).get_all_studies()
     ended = run_sweep(settings)
     assert sum(is_finished(trial) for trial in ended.get_trials()) == 6
+
+
+def test_the_database_gets_the_password_that_is_shown_to_nobody(monkeypatch):
+    asked = []
+
+    def storage(url, engine_kwargs):
+        asked.append(url)
+        raise RuntimeError(f"refused {url}")
+
+    monkeypatch.setattr("optuna.storages.RDBStorage", storage)
+    with pytest.raises(InputError, match="does not answer") as told:
+        open_storage("postgresql://lab:secret@host/studies", ".")
+    assert asked == ["postgresql://lab:secret@host/studies"] and "secret" not in str(told.value)
