@@ -29,12 +29,16 @@ def page_of(rows: Sequence[Mapping[str, Any]], drawn: int, seed: int, explained:
         "# Do the tests notice a change?",
         "",
         "One operator or one number of the code is changed, and the tests of its own package that run the "
-        "changed line, or where none does its file, or else those that import it, are run until one fails. "
+        "changed line, or where none does its file, are run until one fails; of a package whose coverage was "
+        "not measured, and of kernels, those that import the file. "
         "`python -m experiments.mutation`; it goes on where it was interrupted.",
         "",
-        f"Of {drawn} changes drawn over all code (seed {seed}), {len(rows)} were tried. "
+        f"Of {drawn} changes drawn over all code (seed {seed}), {len(rows)} were tried, "
+        f"{sum(not row['measured'] for row in rows)} of them under the tests that import the file. "
         f"Noticed: {_share(noticed, len(rows))}. "
-        f"Noticed, or explained below: {_share(noticed + len(equal), len(rows))}. "
+        f"Noticed, or explained below: {_share(noticed + len(equal), len(rows))}; "
+        f"{sum(explained[row['key']].startswith('mended') for row in equal)} of those explained are noticed by "
+        "tests written since. "
         "Intervals are Wilson's of 95 %. Files are named as in the state that was tried.",
         "",
         "| package | tried | noticed | explained | left |",

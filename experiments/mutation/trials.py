@@ -63,7 +63,8 @@ def tried(
 
 
 def _trial(tree: Path, mutant: Mutant, cover: Covering, work: Path, most_s: float) -> dict[str, Any]:
-    tests = cover.tests_of(mutant, most_s) or tests_that_import(tree, mutant.path)
+    covering = cover.tests_of(mutant, most_s)
+    tests = covering or tests_that_import(tree, mutant.path)
     row = {
         "path": mutant.path,
         "line": mutant.first,
@@ -73,6 +74,7 @@ def _trial(tree: Path, mutant: Mutant, cover: Covering, work: Path, most_s: floa
         "span": mutant.span,
         "key": mutant.key,
         "tests": len(tests),
+        "measured": bool(covering),
     }
     if not tests:
         return row | {"state": UNTESTED, "seconds": 0.0}

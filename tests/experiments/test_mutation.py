@@ -94,7 +94,15 @@ def test_what_tests_notice(project, tmp_path) -> None:
 
 def test_the_page_counts_what_is_explained_apart() -> None:
     rows = [
-        {"path": "fogml/runs/a.py", "function": "f", "before": "a | b", "after": "2", "tests": 3, **more}
+        {
+            "path": "fogml/runs/a.py",
+            "function": "f",
+            "before": "a | b",
+            "after": "2",
+            "tests": 3,
+            "measured": True,
+            **more,
+        }
         for more in (
             {"key": "1", "state": NOTICED},
             {"key": "2", "state": UNNOTICED},
