@@ -37,8 +37,8 @@ def page_of(rows: Sequence[Mapping[str, Any]], drawn: int, seed: int, explained:
         f"{sum(not row['measured'] for row in rows)} of them under the tests that import the file. "
         f"Noticed: {_share(noticed, len(rows))}. "
         f"Noticed, or explained below: {_share(noticed + len(equal), len(rows))}; "
-        f"{sum(explained[row['key']].startswith('mended') for row in equal)} of those explained are noticed by "
-        "tests written since. "
+        f"{sum(explained[row['key']].startswith('mended') for row in equal)} of those explained are noticed "
+        "by tests written since. "
         "Intervals are Wilson's of 95 %. Files are named as in the state that was tried.",
         "",
         "| package | tried | noticed | explained | left |",
