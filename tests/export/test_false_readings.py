@@ -173,3 +173,16 @@ def test_windows_over_bins_stay_within_their_proven_bound(tmp_path, features, ti
     proven = fixed_point_error(plan, source.layout, "q31")
     assert off <= proven < 100.0 * off
     assert f"at most {proven:.3g} deg/h" in fixed_point_lines(proven, plan)[0]
+
+
+def test_a_window_that_tells_nothing_yet_is_not_beyond_the_trained_rates():
+    time = np.arange(3600.0)
+    T = 20.0 + time / 60.0 + 2.0 * np.sin(time / 300.0)
+    plan = Plan.of(
+        make_model("polynomial", "T, dT[slope, 60 s]").fit(Run("up", {"time": time, "gyro": T, "T": T}))
+    )
+    assert plan.limits.box_low[1] > 0.1
+    atoms = np.array([[50.0, 0.0], [50.0, 0.0]])
+    limited, outside = plan.limited(atoms, np.array([False, True]))
+    assert outside.tolist() == [False, True]
+    assert limited[0].tolist() == atoms[0].tolist() and limited[1, 1] > 0.1
