@@ -185,4 +185,4 @@ def test_a_window_that_tells_nothing_yet_is_not_beyond_the_trained_rates():
     atoms = np.array([[50.0, 0.0], [50.0, 0.0]])
     limited, outside = plan.limited(atoms, np.array([False, True]))
     assert outside.tolist() == [False, True]
-    assert limited[0].tolist() == atoms[0].tolist() and limited[1, 1] > 0.1
+    assert limited[0].tolist() == atoms[0].tolist()
