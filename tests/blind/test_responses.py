@@ -19,6 +19,7 @@ from fogml.blind.frame.form import Additive
 from fogml.blind.frame.noise import StateNoise
 from fogml.blind.plan import REALITIES, reality
 from fogml.blind.second.reality import _field, humidity_of
+from fogml.twin.registry import effects
 
 TIME = 10.0 * np.arange(6000.0)
 HIDDEN = [
@@ -117,3 +118,11 @@ def test_soaks_of_a_programme_last_and_the_chamber_stays_in_them(seed: int) -> N
         assert 300.0 <= end - begin <= 6600.0 and first == last
     rates = np.abs(np.diff(points)) / np.diff(corners) * 60.0
     assert np.all((rates == 0.0) | ((rates > 0.29) & (rates < 3.01)))
+
+
+@pytest.mark.parametrize("name", REALITIES)
+def test_forms_with_a_name_in_the_catalogue_are_known_and_no_others(name: str) -> None:
+    made = reality(name)
+    assert all(form.known and form.name in effects() for form in made.known)
+    others = (*made.invented, made.wrong_structure)
+    assert not any(form.known or form.name in effects() for form in others)
