@@ -69,8 +69,11 @@ def implausible(run: Run) -> Iterator[Finding]:
         The output follows the table rate with the other sign, or in another unit.
     """
     yield from _compensated(run)
-    yield from _temperature_units(run)
-    yield from _thermometers(run)
+    told = {name: _unit_told(run.columns[name]) for name in run.temperature_columns}
+    for name in (name for name, unit in told.items() if unit is not None):
+        message = f"'{name}' is stated in degC and {told[name]}"
+        yield Finding("implausible_temperature", message, column=name, count=len(run))
+    yield from _thermometers(run, [name for name, unit in told.items() if unit is None])
     try:
         gyro = run.gyro_deg_h
     except InputError:
@@ -109,18 +112,6 @@ def _compensated(run: Run) -> Iterator[Finding]:
         yield Finding("already_compensated", message, column="gyro")
 
 
-def _temperature_units(run: Run) -> Iterator[Finding]:
-    for name in run.temperature_columns:
-        told = _unit_told(run.columns[name])
-        if told is not None:
-            yield Finding(
-                "implausible_temperature",
-                f"'{name}' is stated in degC and {told}",
-                column=name,
-                count=len(run),
-            )
-
-
 def _unit_told(values: FloatArray) -> str | None:
     """What a temperature seems to be in, if not in degC."""
     least, most = large.extremes(values)
@@ -134,8 +125,7 @@ def _unit_told(values: FloatArray) -> str | None:
     return None
 
 
-def _thermometers(run: Run) -> Iterator[Finding]:
-    names = [name for name in run.temperature_columns if _unit_told(run.columns[name]) is None]
+def _thermometers(run: Run, names: Sequence[str]) -> Iterator[Finding]:
     if _most_apart([run.columns[name] for name in names]) < _NEAR_SHARE * _APART_IN_FAHRENHEIT:
         return
     means = {name: large.median(large.parts_of(run.columns[name])) for name in names}
