@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import replace
+from importlib import import_module
+from pkgutil import iter_modules
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +17,7 @@ from fogml.blind.first.effects.invented import HotBursts
 from fogml.blind.first.effects.turning import HuntingServo
 from fogml.blind.first.programme import _chamber_path
 from fogml.blind.frame import nominal
-from fogml.blind.frame.form import Additive
+from fogml.blind.frame.form import Additive, Form
 from fogml.blind.frame.noise import StateNoise
 from fogml.blind.plan import REALITIES, reality
 from fogml.blind.second.reality import _field, humidity_of
@@ -126,3 +128,17 @@ def test_forms_with_a_name_in_the_catalogue_are_known_and_no_others(name: str) -
     assert all(form.known and form.name in effects() for form in made.known)
     others = (*made.invented, made.wrong_structure)
     assert not any(form.known or form.name in effects() for form in others)
+
+
+@pytest.mark.parametrize("name", REALITIES)
+def test_no_form_that_is_written_is_left_out(name: str) -> None:
+    made = reality(name)
+    effects_of = import_module(made.wrong_structure.__module__.rpartition(".")[0])
+    written = {
+        form
+        for module in iter_modules(effects_of.__path__, f"{effects_of.__name__}.")
+        for form in vars(import_module(module.name)).values()
+        if isinstance(form, type) and issubclass(form, Form) and form.__module__ == module.name
+    }
+    used = {*made.known, *made.invented, made.wrong_structure}
+    assert {form for form in written if "name" in vars(form)} == used
