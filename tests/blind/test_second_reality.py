@@ -62,6 +62,14 @@ def test_in_a_long_ramp_the_plant_takes_up_its_heat_capacity_times_the_rate() ->
     )
 
 
+def test_parts_weigh_in_proportion_to_the_winding() -> None:
+    plants = [Plant(draw_plant(np.random.default_rng(seed))) for seed in (1, 2)]
+    windings = [plant.capacities[plant.cells].sum() for plant in plants]
+    parts = [plant.capacities[: plant.cells.min()] for plant in plants]
+    assert windings[0] != pytest.approx(windings[1], rel=0.05)
+    assert parts[0] / windings[0] == pytest.approx(parts[1] / windings[1])
+
+
 def test_relays_forget_what_a_larger_swing_wiped_out_and_know_no_time() -> None:
     plain = zigzag(0.0, 50.0, -30.0, points=81)
     minor = zigzag(0.0, 30.0, 10.0, 25.0, 12.0, 50.0, -30.0, points=241)
