@@ -7,6 +7,7 @@ are integrated out of the lowest rows (restricted likelihood): they cost only th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,10 @@ from fogml.signals.output_filters import NO_FILTER, OutputFilter
 AFTER = ("Q", "W", "E")
 """Terms that a filter does not act on."""
 _TOLERANCE = 1e-7
+_SINGULAR = 1e-13
+"""Share of an information that rounding makes."""
+_HEARD = 0.1
+"""Degrees of freedom that a mean of power stands on, at least."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,28 @@ class SpectrumFit:
         return int(
             np.count_nonzero(self.coefficients) + self.filter.free + (self.terms.correlation_s is not None)
         )
+
+
+class _Told(NamedTuple):
+    """What the data say of a density.
+
+    Attributes
+    ----------
+    loss
+        As of a fit.
+    power
+        Of the rows, with what the columns take.
+    constants, covariance
+        As of a fit.
+    taken
+        Orthonormal basis of the columns over the root of the density, shape (lowest rows, columns).
+    """
+
+    loss: float
+    power: FloatArray
+    constants: FloatArray
+    covariance: FloatArray
+    taken: FloatArray
 
 
 class SpectrumModel:
@@ -156,8 +183,6 @@ class SpectrumModel:
         rounds
             At most.
         """
-        from scipy.optimize import nnls
-
         freedom = self.freedom / (1.0 + 0.5 * self.freedom * excess)
         corner = max(start.log_corner if start is not None else log_corner, self._lowest_corner)
         design, slopes = self.design(corner)
@@ -171,21 +196,14 @@ class SpectrumModel:
         if not begun:
             density = self._smoothed()
         told = self._told(density, freedom)
-        loss = told[0] if begun else np.inf
+        loss = told.loss if begun else np.inf
         for _ in range(rounds):
-            power = told[1]
-            weight = np.sqrt(0.5 * freedom) / np.where(self.used, density, 1.0)
             columns = design[:, free]
             if slopes is not None:
-                along = slopes @ coefficients if np.any(coefficients) else np.zeros(len(power))
+                along = slopes @ coefficients if np.any(coefficients) else np.zeros(len(density))
                 columns = np.column_stack((columns, along, -along))
-            target = power if held is None else power - design[:, held[0]] * held[1]
-            scaled = columns * weight[:, None]
-            norms = np.linalg.norm(scaled, axis=0)
-            norms[norms == 0.0] = 1.0
-            table = np.column_stack((scaled / norms, target * weight))
-            triangle = np.asarray(np.linalg.qr(table, mode="r"))
-            found = nnls(triangle[:, :-1], triangle[:, -1])[0] / norms
+            given = 0.0 if held is None else design[:, held[0]] * held[1]
+            found = self._scored(columns, given, density, told, freedom)
             proposed = coefficients.copy()
             proposed[free] = found[: len(free)]
             moved = 0.0 if slopes is None else float(np.clip(found[-2] - found[-1], -1.0, 1.0))
@@ -197,20 +215,63 @@ class SpectrumModel:
                 new_density = new_design @ mixed
                 if np.all(new_density[self.used] > 0.0):
                     new_told = self._told(new_density, freedom)
-                    if new_told[0] <= loss:
+                    if new_told.loss <= loss:
                         better = True
                         break
                 step *= 0.5
             if not better:
                 break
-            gained = loss - new_told[0]
+            gained = loss - new_told.loss
             corner, design, slopes, coefficients = new_corner, new_design, new_slopes, mixed
-            density, told, loss = new_density, new_told, new_told[0]
+            density, told, loss = new_density, new_told, new_told.loss
             if gained <= _TOLERANCE * (1.0 + abs(loss)):
                 break
         return SpectrumFit(
-            self.terms, self.filter, corner, coefficients, density, float(loss), told[2], told[3], self.used
+            self.terms,
+            self.filter,
+            corner,
+            coefficients,
+            density,
+            float(loss),
+            told.constants,
+            told.covariance,
+            self.used,
         )
+
+    def _scored(
+        self,
+        columns: FloatArray,
+        given: FloatArray | float,
+        density: FloatArray,
+        told: _Told,
+        freedom: FloatArray,
+    ) -> FloatArray:
+        """Coefficients of a step of Fisher scoring, none negative, beside a density that is given.
+
+        The information is that of the restricted likelihood, half the trace of ``P D P D``: what constants
+        of columns take of a row tells nothing of the noise.
+        """
+        from scipy.optimize import nnls
+
+        weight = np.sqrt(0.5 * freedom) / np.where(self.used, density, 1.0)
+        scaled = columns * weight[:, None]
+        norms = np.linalg.norm(scaled, axis=0)
+        norms[norms == 0.0] = 1.0
+        scaled /= norms
+        both = np.column_stack((scaled, weight * (density - given)))
+        taken, low = told.taken, slice(self._single)
+        left = np.ones(len(density))
+        left[low] -= 2.0 * np.sum(taken**2, axis=1)
+        moments = scaled.T @ (left[:, None] * both)
+        pairs = (taken[:, :, None] * taken[:, None, :]).reshape(self._single, -1)
+        moments += (pairs.T @ scaled[low]).T @ (pairs.T @ both[low])
+        information = moments[:, :-1]
+        told_by = np.diag(information) > _SINGULAR
+        size = np.where(told_by, np.sqrt(np.maximum(np.diag(information), _SINGULAR)), np.inf)
+        values, vectors = np.linalg.eigh(information / np.outer(size, size))
+        pull = (moments[:, -1] + scaled.T @ (weight * (told.power - density))) / size
+        root = np.sqrt(np.maximum(values, _SINGULAR))
+        return np.asarray(nnls(root[:, None] * vectors.T, vectors.T @ pull / root)[0] / size / norms)
 
     def scanned(self, corners: FloatArray) -> SpectrumFit:
         """The fit that goes on from the corner which leads the furthest in a few rounds."""
@@ -219,26 +280,28 @@ class SpectrumModel:
         return self.fit(best) if len(corners) > 1 and np.isfinite(best.loss) else best
 
     def _smoothed(self) -> FloatArray:
-        """Power of the rows about each, for first weights."""
+        """Power of the rows about each, for first weights: the more of it, the less of a row columns take."""
         frequency = np.log2(self.spectrum.frequency_hz[:, 0])
         order = np.argsort(frequency, kind="stable")
         rising = frequency[order]
         low = np.searchsorted(rising, rising - 0.5)
         high = np.searchsorted(rising, rising + 0.5, side="right")
-        freedom = np.maximum(self.freedom[order], 1e-9)
-        sums = np.concatenate(([0.0], np.cumsum(freedom)))
+        left = np.ones(len(order))
+        left[: self._single] -= np.sum(self._told(left, self.freedom).taken ** 2, axis=1)
+        freedom = self.freedom[order]
+        sums = np.concatenate(([0.0], np.cumsum(freedom * left[order])))
         means = np.concatenate(([0.0], np.cumsum(freedom * self.spectrum.power[order])))
+        counted = np.maximum(sums[high] - sums[low], 1e-9)
+        told = counted >= min(_HEARD, float(counted.max()))
         smooth = np.empty(len(order))
-        smooth[order] = (means[high] - means[low]) / (sums[high] - sums[low])
+        smooth[order] = np.interp(rising, rising[told], (means[high] - means[low])[told] / counted[told])
         least = max(float(smooth.max()) * 1e-30, 1e-300)
         return np.maximum(smooth, least)
 
-    def _told(
-        self, density: FloatArray, freedom: FloatArray
-    ) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-        """Loss, power with what the columns take, constants and their covariance."""
+    def _told(self, density: FloatArray, freedom: FloatArray) -> _Told:
+        """What the data say of a density."""
         s, power = self.spectrum, self.spectrum.power
-        constants, covariance = np.empty(0), np.empty((0, 0))
+        constants, covariance, taken = np.empty(0), np.empty((0, 0)), np.empty((self._single, 0))
         loss = 0.0
         if s.columns.shape[1]:
             weight = (self.used / np.where(self.used, density, 1.0))[: self._single]
@@ -251,9 +314,10 @@ class SpectrumModel:
             covariance = root @ root.T
             constants = covariance @ (weighed.T @ s.values)
             rest = s.values - s.columns @ constants
-            taken = np.sum((s.columns @ root) ** 2, axis=1)
+            along = s.columns @ root
+            taken = along * np.sqrt(weight)[:, None]
             power = power.copy()
-            power[: self._single] = rest**2 + taken
+            power[: self._single] = rest**2 + np.sum(along**2, axis=1)
             square = rest**2
             loss += 0.5 * float(np.sum(np.log(values[kept])) + 2.0 * np.sum(np.log(size)))
         else:
@@ -266,7 +330,7 @@ class SpectrumModel:
             high[: self._single] = False
             ratio = np.maximum(s.power[high], 1e-300) / density[high]
             loss += 0.5 * float(freedom[high] @ (ratio - 1.0 - np.log(ratio)))
-        return loss, power, constants, covariance
+        return _Told(loss, power, constants, covariance, taken)
 
 
 def _row_means(shapes: FloatArray, gain: FloatArray) -> FloatArray:

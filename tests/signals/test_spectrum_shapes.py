@@ -1,12 +1,15 @@
-"""Shapes that spectra are fitted by: output filters, and terms as samples show them."""
+"""Shapes that spectra are fitted by: output filters, and terms as samples show them; and their fit."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
+from fogml.arrays import FloatArray
+from fogml.signals.noise_spectrum import spectrum_of
 from fogml.signals.output_filters import LOW_PASSES, OutputFilter
-from fogml.signals.spectrum_fit import SpectrumTerms, term_shapes
+from fogml.signals.spectrum_fit import SpectrumModel, SpectrumTerms, term_shapes
 
 
 @pytest.mark.parametrize("low_pass", LOW_PASSES, ids=str)
@@ -31,3 +34,40 @@ def test_what_the_ends_of_a_smooth_series_add_is_flat_once_differenced_twice() -
     assert shape * np.abs(1.0 - np.exp(-2j * np.pi * frequency * 2.0)) ** 4 == pytest.approx(
         np.full(20, 16.0)
     )
+
+
+@pytest.mark.parametrize("seed", [0, 4, 5])
+def test_a_fit_beside_columns_is_where_a_simplex_ends(seed: int) -> None:
+    """Where constants of columns take most of the lowest rows, what they leave is little to go by."""
+    rng = np.random.default_rng(seed)
+    values = rng.normal(size=2000) + np.cumsum(0.02 * rng.normal(size=2000))
+    waves = np.cos(np.pi * (np.arange(2000)[:, None] + 0.5) / 2000.0 * np.arange(1, 11))
+    spectrum = spectrum_of([values], 1.0, [waves])
+    model = SpectrumModel(spectrum, SpectrumTerms(("N", "B", "K", "Q")))
+    shapes = term_shapes(spectrum.frequency_hz, 1.0, model.terms).mean(axis=1)
+    low, columns = len(spectrum.values), spectrum.columns
+
+    def loss(coefficients: FloatArray) -> float:
+        density = shapes @ coefficients
+        over = columns / density[:low, None]
+        constants = np.linalg.solve(columns.T @ over, over.T @ spectrum.values)
+        rest = spectrum.values - columns @ constants
+        restricted = np.log(density[:low]).sum() + np.linalg.slogdet(columns.T @ over)[1]
+        ratio = spectrum.power[low:] / density[low:]
+        above = spectrum.count[low:] @ (ratio - 1.0 - np.log(ratio))
+        return 0.5 * float(restricted + np.sum(rest**2 / density[:low]) + above)
+
+    fit = model.fit()
+    begin = np.log(np.maximum(fit.coefficients, 1e-6))
+    options = {"xatol": 1e-6, "fatol": 1e-9, "maxiter": 4000, "maxfev": 4000}
+    ends = [
+        minimize(
+            lambda x: loss(np.exp(x)),
+            begin + shift,
+            method="Nelder-Mead",
+            bounds=[(-40.0, 5.0)] * 4,
+            options=options,
+        )
+        for shift in (0.0, [0.0, 1.0, -1.0, 0.0])
+    ]
+    assert loss(fit.coefficients) < min(end.fun for end in ends) + 1e-5
