@@ -7,6 +7,7 @@ file. 130, 143: interrupted, terminated.
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -180,12 +181,12 @@ class Program(Group):
             fail(_system_message(error))
         except UnicodeEncodeError as error:
             # Python takes any bytes for a name; the libraries that read and write files take text.
-            name = str(error.object)
-            if not any("\udc80" <= letter <= "\udcff" for letter in name):
+            name = re.search(r"\S*[\udc80-\udcff]\S*", str(error.object))
+            if name is None:
                 raise
             fail(
-                f"{printable(name)}: a name that is no text in UTF-8; rename the file or folder, or set a "
-                "locale of UTF-8 (LC_ALL=C.UTF-8)"
+                f"{printable(name.group())}: a name that is no text in UTF-8; rename the file or folder, or "
+                "set a locale of UTF-8 (LC_ALL=C.UTF-8)"
             )
         except MemoryError:
             fail("not enough memory for this; close other programs or use a shorter run")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from typing import Any
 
@@ -18,11 +19,12 @@ class Parquet:
     """A Parquet file: one array per column."""
 
     def __init__(self, path: str, keys: list[str]) -> None:
+        from pyarrow import OSFile
         from pyarrow.parquet import ParquetFile
 
         # Without a buffer, streaming would hold a column's whole row group, however large.
         self.file = ParquetFile(
-            path,
+            OSFile(os.fsencode(path)),  # a name need not be text
             pre_buffer=False,
             memory_map=False,
             buffer_size=_BUFFER_BYTES,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -121,9 +122,11 @@ def test_an_interrupt_while_the_staging_folder_is_made_leaves_nothing(whole, tmp
 def test_a_name_that_is_no_text_is_told_or_taken(run_files, tmp_path, invoke):
     named = os.fsdecode(bytes(tmp_path) + b"/a\xff.csv")
     os.rename(tmp_path / "a.csv", named)
-    result = invoke("inspect", named, status=2)
+    invoke("inspect", named)
+    made = os.fsdecode(bytes(tmp_path) + b"/made\xff.csv")
+    result = invoke("simulate", "--twin", "nominal", "--programme", "four-positions", "-o", made, status=2)
     assert len(result.stderr.splitlines()) == 1
-    assert "a name that is no text in UTF-8; rename" in result.stderr
+    assert re.search(r"fogml: made\ufffd\S*: a name that is no text in UTF-8; rename", result.stderr)
     # A folder of results may have any name; running its settings again finds it.
     out = Path(os.fsdecode(bytes(tmp_path) + b"/out\xfe"))
     runs = (tmp_path / "b.csv", "--test", tmp_path / "b.csv", "--model", "M1")
