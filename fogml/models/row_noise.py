@@ -19,7 +19,7 @@ from fogml.models.table import Compose, RunRows, TrainingTable, averaged_table, 
 from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
-from fogml.signals.spectrum_fit import SpectrumTerms, term_shapes
+from fogml.signals.spectrum_terms import SpectrumTerms, term_shapes
 from fogml.signals.whitening import Whitener
 
 _GAP = 1.5

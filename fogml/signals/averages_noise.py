@@ -8,7 +8,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.signals.noise_spectrum import Spectrum
-from fogml.signals.spectrum_fit import SpectrumTerms, term_shapes
+from fogml.signals.spectrum_terms import SpectrumTerms, term_shapes
 
 
 @dataclass(frozen=True)

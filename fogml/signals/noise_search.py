@@ -13,10 +13,10 @@ from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, Ou
 from fogml.signals.spectrum_fit import (
     SpectrumFit,
     SpectrumModel,
-    SpectrumTerms,
     excess_of,
     relative_errors,
 )
+from fogml.signals.spectrum_terms import SpectrumTerms
 
 PLAIN = SpectrumTerms()
 BEHIND = SpectrumTerms(("N", "B", "K", "Q", "W"))
