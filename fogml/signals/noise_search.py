@@ -7,15 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.signals.noise_spectrum import Spectrum
 from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, OutputFilter
-from fogml.signals.spectrum_fit import (
-    SpectrumFit,
-    SpectrumModel,
-    excess_of,
-    relative_errors,
-)
+from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel
 from fogml.signals.spectrum_terms import SpectrumTerms
 
 PLAIN = SpectrumTerms()
@@ -127,7 +122,7 @@ def search_noise(
     weights = np.exp([c.evidence - live[0].evidence for c in live])
     p_value = fit_p_value(live[0].model, live[0].fit)
     # Scatter that chance explains is none: intervals would widen for nothing.
-    excess = excess_of(live[0].model, live[0].fit) if p_value < misfit_level else 0.0
+    excess = _excess_of(live[0].model, live[0].fit) if p_value < misfit_level else 0.0
     if excess > 0.0:
         live = [replace(c, fit=c.model.fit(c.fit, excess=excess)) for c in live]
     return NoiseSearch(spectrum, tuple(live), weights / weights.sum(), excess, p_value)
@@ -137,9 +132,32 @@ def fit_p_value(model: SpectrumModel, fit: SpectrumFit) -> float:
     """Chance of errors of the rows as large as a fit's, by chi-square."""
     from scipy.stats import chi2
 
-    errors, rows = relative_errors(model, fit)
+    errors, rows = _relative_errors(model, fit)
     freedom = len(rows) - fit.free
     return float(chi2.sf(float(errors @ errors), freedom)) if freedom > 0 else 1.0
+
+
+def _relative_errors(model: SpectrumModel, fit: SpectrumFit) -> tuple[FloatArray, IndexArray]:
+    """Normal errors of the rows of many coefficients, and which: cube roots (Wilson and Hilferty, 1931)."""
+    rows = np.flatnonzero((model.spectrum.count >= 8.0) & fit.used)
+    scale = 2.0 / (9.0 * model.freedom[rows])
+    ratio = model.spectrum.power[rows] / fit.density[rows]
+    return (np.cbrt(ratio) - (1.0 - scale)) / np.sqrt(scale), rows
+
+
+def _excess_of(model: SpectrumModel, fit: SpectrumFit) -> float:
+    """Variance of the rows' relative errors beyond chance (Mandel and Paule, 1970)."""
+    errors, rows = _relative_errors(model, fit)
+    free = len(rows) - fit.free
+    if free <= 0 or float(errors @ errors) <= free:
+        return 0.0
+    relative = np.minimum(np.abs(model.spectrum.power[rows] / fit.density[rows] - 1.0), 1.0) ** 2
+    chance = 2.0 / model.freedom[rows]
+    low, high = 0.0, 4.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if np.sum(relative / (chance + middle)) > free else (low, middle)
+    return high
 
 
 def _filtered(spectrum: Spectrum, plain: NoiseChoice, size: float) -> list[NoiseChoice]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.arrays import BoolArray, FloatArray
 from fogml.signals.noise_spectrum import Spectrum
 from fogml.signals.output_filters import NO_FILTER, OutputFilter
 from fogml.signals.spectrum_terms import AFTER, SpectrumTerms, term_shapes
@@ -318,26 +318,3 @@ class SpectrumModel:
 def _row_means(shapes: FloatArray, gain: FloatArray) -> FloatArray:
     """Means over the frequencies of each row of shapes behind a gain, shape (rows, terms)."""
     return np.asarray(np.einsum("rkt,rk->rt", shapes, gain)) / max(gain.shape[1], 1)
-
-
-def relative_errors(model: SpectrumModel, fit: SpectrumFit) -> tuple[FloatArray, IndexArray]:
-    """Normal errors of the rows of many coefficients, and which: cube roots (Wilson and Hilferty, 1931)."""
-    rows = np.flatnonzero((model.spectrum.count >= 8.0) & fit.used)
-    scale = 2.0 / (9.0 * model.freedom[rows])
-    ratio = model.spectrum.power[rows] / fit.density[rows]
-    return (np.cbrt(ratio) - (1.0 - scale)) / np.sqrt(scale), rows
-
-
-def excess_of(model: SpectrumModel, fit: SpectrumFit) -> float:
-    """Variance of the rows' relative errors beyond chance (Mandel and Paule, 1970)."""
-    errors, rows = relative_errors(model, fit)
-    free = len(rows) - fit.free
-    if free <= 0 or float(errors @ errors) <= free:
-        return 0.0
-    relative = np.minimum(np.abs(model.spectrum.power[rows] / fit.density[rows] - 1.0), 1.0) ** 2
-    chance = 2.0 / model.freedom[rows]
-    low, high = 0.0, 4.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if np.sum(relative / (chance + middle)) > free else (low, middle)
-    return high
