@@ -30,8 +30,8 @@ def page_of(rows: Sequence[Mapping[str, Any]], drawn: int, seed: int, explained:
         "",
         "One operator or one number of the code is changed, and the tests of its own package that run the "
         "changed line, or where none does its file, are run until one fails, the quickest first and as "
-        "many as `--most` allows; of a package whose coverage was not measured, and of kernels, those that import "
-        "the file. What was not noticed may thus be noticed by a slower test. "
+        "many as `--most` allows; of a package whose coverage was not measured, and of kernels, those that "
+        "import the file. What was not noticed may thus be noticed by a slower test. "
         "`python -m experiments.mutation`; it goes on where it was interrupted.",
         "",
         f"Of {drawn} changes drawn over all code (seed {seed}), {len(rows)} were tried, "
