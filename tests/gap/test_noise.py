@@ -9,7 +9,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.gap.model import TwinModel
-from fogml.gap.noise import prior_of
+from fogml.gap.noise import StaticRun, prior_of
 from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -67,3 +67,13 @@ def test_drift_with_temperature_is_no_noise_of_a_static_run():
 def test_what_is_no_noise_run_is_refused(run, message):
     with pytest.raises(InputError, match=message):
         prior_of(MODEL, run)
+
+
+def test_a_static_run_is_taken_as_means_over_even_rows_from_its_first_sample_on() -> None:
+    time = 500.0 + 2.0 * np.arange(500)
+    gyro = np.random.default_rng(3).standard_normal(500)
+    run = Run.from_columns(time=time, gyro=gyro, T=np.full(500, 25.0))
+    found = StaticRun.of(run, replace(STANDARD.noise, static_rows=50))
+    assert found.row_s == 20.0
+    assert found.values == pytest.approx(gyro.reshape(50, 10).mean(axis=1))
+    assert found.end_s == pytest.approx(500.0 + 20.0 * np.arange(1, 51))
