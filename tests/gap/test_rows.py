@@ -79,3 +79,19 @@ def test_steps_of_a_chambers_set_point_are_no_coarse_sensors():
 
     assert not coarse(x)
     assert coarse(np.rint(10.0 * x) / 10.0)
+
+
+def test_places_in_the_winding_are_its_middle_and_its_faces_and_none_outside():
+    run = _cycle()
+    T_in, T_out = run.columns["T"] + 3.0, run.columns["T"] - 1.0
+    columns = {"time": run.time, "gyro": run.gyro, "T_in": T_in, "T_out": T_out}
+    scene = _scene(Run.from_columns("faces", **columns))
+    (rows,) = scene.runs
+    inner, outer = rows.even.temperature("T_in"), rows.even.temperature("T_out")
+    places = [place.temperature for place in scene.coil(rows)]
+    assert [np.flatnonzero([np.allclose(p, q) for p in places]).tolist() for q in (inner, outer)] == [
+        [1],
+        [2],
+    ]
+    np.testing.assert_allclose(places[0], 0.5 * (inner + outer))
+    assert len(places) == 3
