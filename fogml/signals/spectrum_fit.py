@@ -19,6 +19,10 @@ from fogml.signals.spectrum_terms import AFTER, SpectrumTerms, term_shapes
 _TOLERANCE = 1e-7
 _SINGULAR = 1e-13
 """Share of an information that rounding makes."""
+_ROUNDED = 1e-14
+"""Least eigenvalue of an information of diagonal 1."""
+_COLLINEAR = 1e-5
+"""Share of the greatest singular value from which a column is another one's."""
 _HEARD = 0.1
 """Degrees of freedom that a mean of power stands on, at least."""
 
@@ -112,6 +116,7 @@ class SpectrumModel:
         self.spectrum, self.terms, self.filter = spectrum, terms, output_filter
         self.used = np.ones(len(spectrum.power), dtype=np.bool_) if used is None else used
         self._single = len(spectrum.values)
+        self._basis, self._back = _independent(spectrum.columns)
         self._cycles = spectrum.frequency_hz * spectrum.sample_s
         # A filter that lets nothing of the whole spectrum pass is told from no other.
         self._lowest_corner = float(np.log(np.pi * np.min(self._cycles, initial=0.5)))
@@ -209,15 +214,7 @@ class SpectrumModel:
             if gained <= _TOLERANCE * (1.0 + abs(loss)):
                 break
         return SpectrumFit(
-            self.terms,
-            self.filter,
-            corner,
-            coefficients,
-            density,
-            float(loss),
-            told.constants,
-            told.covariance,
-            self.used,
+            self.terms, self.filter, corner, coefficients, density, float(loss), *told[2:4], self.used
         )
 
     def _scored(
@@ -283,25 +280,26 @@ class SpectrumModel:
     def _told(self, density: FloatArray, freedom: FloatArray) -> _Told:
         """What the data say of a density."""
         s, power = self.spectrum, self.spectrum.power
-        constants, covariance, taken = np.empty(0), np.empty((0, 0)), np.empty((self._single, 0))
+        count = s.columns.shape[1]
+        constants, covariance, taken = np.empty(count), np.empty((count, count)), np.empty((self._single, 0))
         loss = 0.0
-        if s.columns.shape[1]:
+        if self._basis.shape[1]:
             weight = (self.used / np.where(self.used, density, 1.0))[: self._single]
-            weighed = s.columns * weight[:, None]
-            information = weighed.T @ s.columns
+            weighed = self._basis * weight[:, None]
+            information = weighed.T @ self._basis
             size = np.sqrt(np.maximum(np.diag(information), 1e-300))
             values, vectors = np.linalg.eigh(information / np.outer(size, size))
-            kept = values > 1e-10 * max(float(values[-1]), 1e-300)
-            root = (vectors[:, kept] / np.sqrt(values[kept])) / size[:, None]
-            covariance = root @ root.T
-            constants = covariance @ (weighed.T @ s.values)
-            rest = s.values - s.columns @ constants
-            along = s.columns @ root
+            values = np.maximum(values, _ROUNDED)
+            root = (vectors / np.sqrt(values)) / size[:, None]
+            of_basis = root @ (root.T @ (weighed.T @ s.values))
+            constants, covariance = self._back @ of_basis, self._back @ root @ root.T @ self._back.T
+            rest = s.values - self._basis @ of_basis
+            along = self._basis @ root
             taken = along * np.sqrt(weight)[:, None]
             power = power.copy()
             power[: self._single] = rest**2 + np.sum(along**2, axis=1)
             square = rest**2
-            loss += 0.5 * float(np.sum(np.log(values[kept])) + 2.0 * np.sum(np.log(size)))
+            loss += 0.5 * float(np.sum(np.log(values)) + 2.0 * np.sum(np.log(size)))
         else:
             square = s.values**2
         low = self.used[: self._single]
@@ -313,6 +311,18 @@ class SpectrumModel:
             ratio = np.maximum(s.power[high], 1e-300) / density[high]
             loss += 0.5 * float(freedom[high] @ (ratio - 1.0 - np.log(ratio)))
         return _Told(loss, power, constants, covariance, taken)
+
+
+def _independent(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal basis of columns, without what rounding makes, and what takes its coefficients to theirs.
+
+    Found once, and not for each density: a likelihood whose columns come and go with it has steps.
+    """
+    lengths = np.linalg.norm(columns, axis=0)
+    lengths[lengths == 0.0] = 1.0
+    left, sizes, right = np.linalg.svd(columns / lengths, full_matrices=False)
+    kept = sizes > _COLLINEAR * sizes.max(initial=0.0)
+    return left[:, kept], right[kept].T / sizes[kept] / lengths[:, None]
 
 
 def _row_means(shapes: FloatArray, gain: FloatArray) -> FloatArray:

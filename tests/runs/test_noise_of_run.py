@@ -7,10 +7,12 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from fogml.errors import InputError
+from fogml.runs import noise_of_run
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
+from fogml.signals import noise_terms
 
 
 def still_run(seed: int = 1, n: int = 20_000, **columns: np.ndarray) -> Run:
@@ -198,3 +200,16 @@ def test_drift_over_a_cycle_is_no_noise_behind_a_filter(recorded):
         low, high = report["terms"]["N"]["ci"]
         assert low < 0.01 < high
         assert report["terms"]["B"]["ci"][0] == 0.0
+
+
+def test_the_likelihood_of_a_recording_has_no_steps(monkeypatch):
+    """What its temperature makes is nearly collinear; a column that comes and goes is 10 nats."""
+    found = []
+    search = noise_terms.search_noise
+    monkeypatch.setattr(noise_terms, "search_noise", lambda *a: found.append(search(*a)) or found[-1])
+    monkeypatch.setattr(noise_of_run, "noise_terms", noise_terms.noise_terms)
+    noise_report(shipped_run("thermal-cycle-3-z"))
+    best = found[0].candidates[0]
+    levels = best.fit["N"] * np.linspace(0.9, 1.1, 41)
+    losses = [best.model.fit(best.fit, held=(0, level)).loss for level in levels]
+    assert np.abs(np.diff(losses, 2)).max() < 0.1
