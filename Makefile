@@ -7,8 +7,7 @@ READY := $(VENV)/.ready
 EXTRAS := xlsx,tdms,mdf,ulog,ros,mcap,miniseed,sweep,cluster,export,test
 # Two workers share two cores: threads of their own would wait for each other.
 TESTED := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-# Python compiles a module when it is first loaded: most of what packages bring never is.
-INSTALL := $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-compile -c constraints.txt
+INSTALL := $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
 
 .PHONY: demo test oldest newest docs lint format benchmarks clean
 

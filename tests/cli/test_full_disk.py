@@ -10,6 +10,7 @@ import contextlib
 import os
 import resource
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -28,13 +29,15 @@ UNIT_KIB = 1570
 
 @contextlib.contextmanager
 def files_up_to(most: int) -> Iterator[None]:
-    """No file may have more than `most` bytes."""
+    """No file may have more than `most` bytes; Python would keep half of a module's bytecode."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    written, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        sys.dont_write_bytecode = written
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import resource
+import sys
 
 import pytest
 from optuna.storages import JournalStorage
@@ -54,6 +55,7 @@ def test_half_a_line_is_dropped_by_the_next_writer(tmp_path):
 
 
 def _sweep_on_a_small_disk(settings, most, told):
+    sys.dont_write_bytecode = True  # else half of a module's stays
     resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
     try:
         run_sweep(settings)
