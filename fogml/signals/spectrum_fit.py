@@ -266,7 +266,7 @@ class SpectrumModel:
         low = np.searchsorted(rising, rising - 0.5)
         high = np.searchsorted(rising, rising + 0.5, side="right")
         left = np.ones(len(order))
-        left[: self._single] -= np.sum(self._told(left, self.freedom).taken ** 2, axis=1)
+        left[: self._single] -= np.sum(self._basis**2, axis=1)
         freedom = self.freedom[order]
         sums = np.concatenate(([0.0], np.cumsum(freedom * left[order])))
         means = np.concatenate(([0.0], np.cumsum(freedom * self.spectrum.power[order])))
@@ -281,7 +281,7 @@ class SpectrumModel:
         """What the data say of a density."""
         s, power = self.spectrum, self.spectrum.power
         count = s.columns.shape[1]
-        constants, covariance, taken = np.empty(count), np.empty((count, count)), np.empty((self._single, 0))
+        constants, covariance, taken = np.zeros(count), np.zeros((count, count)), np.empty((self._single, 0))
         loss = 0.0
         if self._basis.shape[1]:
             weight = (self.used / np.where(self.used, density, 1.0))[: self._single]
