@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -41,12 +42,17 @@ class Resolution:
         Bins in an octave of frequency above them: S may change by a tenth in one.
     line_chance
         Chance of taking noise for a line, of the whole spectrum.
+    collinear
+        Share of the greatest singular value of the columns, each of length 1, from which a direction is told.
+        Thermometers of one make whose readings agree to a few counts differ by more; what is below is the
+        rounding of columns that are sums of others, of no physical meaning.
     """
 
     single: int = 64
     most_single: int = 1024
     per_octave: int = 16
     line_chance: float = 1e-3
+    collinear: float = 1e-5
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,8 @@ class Spectrum:
         Constants of the columns that were taken out beforehand by ordinary least squares, shape (p,).
     lines
         Sinusoids whose coefficients are left out.
+    collinear
+        As of `Resolution`.
     """
 
     sample_s: float
@@ -89,6 +97,19 @@ class Spectrum:
     columns: FloatArray
     removed: FloatArray
     lines: tuple[SpectralLine, ...] = ()
+    collinear: float = Resolution.collinear
+
+    @cached_property
+    def basis(self) -> tuple[FloatArray, FloatArray]:
+        """Orthonormal basis of the columns, and what takes its coefficients to their constants.
+
+        Found once, and not for each density: a likelihood whose columns come and go with it has steps.
+        """
+        lengths = np.linalg.norm(self.columns, axis=0)
+        lengths[lengths == 0.0] = 1.0
+        left, sizes, right = np.linalg.svd(self.columns / lengths, full_matrices=False)
+        kept = sizes > self.collinear * sizes.max(initial=0.0)
+        return left[:, kept], right[kept].T / sizes[kept] / lengths[:, None]
 
 
 def spectrum_of(
@@ -177,6 +198,7 @@ def spectrum_of(
         np.vstack(low_x),
         removed,
         tuple(sorted(lines, key=lambda line: -line.amplitude)),
+        fine.collinear,
     )
 
 

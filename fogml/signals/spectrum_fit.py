@@ -17,14 +17,8 @@ from fogml.signals.output_filters import NO_FILTER, OutputFilter
 from fogml.signals.spectrum_terms import AFTER, SpectrumTerms, term_shapes
 
 _TOLERANCE = 1e-7
-_SINGULAR = 1e-13
-"""Share of an information that rounding makes."""
-_ROUNDED = 1e-14
-"""Least eigenvalue of an information of diagonal 1."""
-_COLLINEAR = 1e-5
-"""Share of the greatest singular value from which a column is another one's."""
-_HEARD = 0.1
-"""Degrees of freedom that a mean of power stands on, at least."""
+_ROUNDED = 1e-13
+"""Least eigenvalue of an information of diagonal 1: below it rounding makes what there is."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +110,7 @@ class SpectrumModel:
         self.spectrum, self.terms, self.filter = spectrum, terms, output_filter
         self.used = np.ones(len(spectrum.power), dtype=np.bool_) if used is None else used
         self._single = len(spectrum.values)
-        self._basis, self._back = _independent(spectrum.columns)
+        self._basis, self._back = spectrum.basis
         self._cycles = spectrum.frequency_hz * spectrum.sample_s
         # A filter that lets nothing of the whole spectrum pass is told from no other.
         self._lowest_corner = float(np.log(np.pi * np.min(self._cycles, initial=0.5)))
@@ -245,11 +239,11 @@ class SpectrumModel:
         pairs = (taken[:, :, None] * taken[:, None, :]).reshape(self._single, -1)
         moments += (pairs.T @ scaled[low]).T @ (pairs.T @ both[low])
         information = moments[:, :-1]
-        told_by = np.diag(information) > _SINGULAR
-        size = np.where(told_by, np.sqrt(np.maximum(np.diag(information), _SINGULAR)), np.inf)
+        told_by = np.diag(information) > _ROUNDED
+        size = np.where(told_by, np.sqrt(np.maximum(np.diag(information), _ROUNDED)), np.inf)
         values, vectors = np.linalg.eigh(information / np.outer(size, size))
         pull = (moments[:, -1] + scaled.T @ (weight * (told.power - density))) / size
-        root = np.sqrt(np.maximum(values, _SINGULAR))
+        root = np.sqrt(np.maximum(values, _ROUNDED))
         return np.asarray(nnls(root[:, None] * vectors.T, vectors.T @ pull / root)[0] / size / norms)
 
     def scanned(self, corners: FloatArray) -> SpectrumFit:
@@ -271,7 +265,8 @@ class SpectrumModel:
         sums = np.concatenate(([0.0], np.cumsum(freedom * left[order])))
         means = np.concatenate(([0.0], np.cumsum(freedom * self.spectrum.power[order])))
         counted = np.maximum(sums[high] - sums[low], 1e-9)
-        told = counted >= min(_HEARD, float(counted.max()))
+        # A tenth of a degree of freedom suffices for what only chooses where the fit begins.
+        told = counted >= min(0.1, float(counted.max()))
         smooth = np.empty(len(order))
         smooth[order] = np.interp(rising, rising[told], (means[high] - means[low])[told] / counted[told])
         least = max(float(smooth.max()) * 1e-30, 1e-300)
@@ -311,18 +306,6 @@ class SpectrumModel:
             ratio = np.maximum(s.power[high], 1e-300) / density[high]
             loss += 0.5 * float(freedom[high] @ (ratio - 1.0 - np.log(ratio)))
         return _Told(loss, power, constants, covariance, taken)
-
-
-def _independent(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Orthonormal basis of columns, without what rounding makes, and what takes its coefficients to theirs.
-
-    Found once, and not for each density: a likelihood whose columns come and go with it has steps.
-    """
-    lengths = np.linalg.norm(columns, axis=0)
-    lengths[lengths == 0.0] = 1.0
-    left, sizes, right = np.linalg.svd(columns / lengths, full_matrices=False)
-    kept = sizes > _COLLINEAR * sizes.max(initial=0.0)
-    return left[:, kept], right[kept].T / sizes[kept] / lengths[:, None]
 
 
 def _row_means(shapes: FloatArray, gain: FloatArray) -> FloatArray:
