@@ -1,4 +1,4 @@
-"""North from recorded positions: means of each, azimuth, drift, standard errors; and such runs simulated."""
+"""North from recorded positions: means of each, azimuth, drift, and standard errors under its noise."""
 
 from __future__ import annotations
 
@@ -7,23 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.arrays import FloatArray
+from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError, known_are
 from fogml.lab.north import (
     DEFAULT_ORDER,
-    Drift,
     DriftError,
-    Scheme,
     check_design,
     design_matrix,
     horizontal_rate,
 )
-from fogml.runs.facts import Facts
+from fogml.models.linear import LinearRegressor
+from fogml.models.row_noise import noise_covariance
+from fogml.models.table import RunRows
 from fogml.runs.run import Run
 
 METHODS = ("auto", "plain", "drift-observing")
-_SEEN = 3.0
-_ROUND_OFF = 1e-11
+ROWS_A_STAY = 32
+"""Means over a stay that its noise is told from: enough for its slope over frequency, few enough that
+rounding to counts has averaged out."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class NorthFix:
     ----------
     azimuth_deg, se_deg
         Azimuth clockwise from north of the input axis in the first angle's position, and its standard
-        error [deg]; None where each position has one sample only.
+        error under the gyro's own noise [deg]; None where the samples are too few to tell that.
     method
         ``plain`` or ``drift-observing``.
     plain_deg, observed_deg
@@ -72,13 +73,17 @@ class NorthFix:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Stays:
+    """Position, mean, middle time and length [s] of each stay; time, output and stay of every sample."""
+
     positions: FloatArray
     means: FloatArray
     times: FloatArray
-    counts: FloatArray
-    variance: float | None
+    lengths_s: FloatArray
+    time: FloatArray
+    gyro: FloatArray
+    stay: IndexArray
 
 
 def north_from_positions(
@@ -104,8 +109,8 @@ def north_from_positions(
     order_deg
         Angle of position 1, 2, ... [deg].
     method
-        ``plain``, ``drift-observing``, or ``auto``: the second where a linear drift shows, at three
-        standard errors.
+        ``plain``, ``drift-observing``, or ``auto``: the second where the positions tell a linear drift. A
+        drift of the bias too small to show is a multiple of the plain result's standard error.
     settle_s
         Time left out at the begin of each stay [s].
     latitude_deg
@@ -124,42 +129,38 @@ def north_from_positions(
     angles = np.asarray(order_deg, dtype=np.float64)[stays.positions.astype(int) - 1]
     plain_design = design_matrix(angles, sense, None)
     check_design(plain_design, False)
-    wide_design = design_matrix(angles, sense, stays.times)
-    weights = np.sqrt(stays.counts)
-    plain, plain_cov = _fitted(plain_design, stays.means, weights, stays.variance)
-    tells_drift = _tells_drift(wide_design)
-    if method == "drift-observing" and not tells_drift:
-        check_design(wide_design, True)
-    wide, wide_cov = (
-        _fitted(wide_design, stays.means, weights, stays.variance) if tells_drift else (None, None)
-    )
-    drift = float(wide[3]) if wide is not None else None
-    drift_se = float(np.sqrt(wide_cov[3, 3])) if wide_cov is not None else None
-    observed = method == "drift-observing" or (
-        method == "auto" and drift is not None and _shows(drift, drift_se, stays)
-    )
-    chosen, covariance = (wide, wide_cov) if observed else (plain, plain_cov)
-    assert chosen is not None
+    try:
+        check_design(design_matrix(angles, sense, stays.times), True)
+    except InputError:
+        if method == "drift-observing":
+            raise
+        wide = None
+    else:
+        wide = _fitted(stays, plain_design, True)
+    plain = _fitted(stays, plain_design, False)
+    observed = wide is not None and method != "plain"
+    chosen, covariance = wide if wide is not None and observed else plain
+    drift = None if wide is None else float(wide[0][3])
     horizontal = float(np.hypot(chosen[0], chosen[1]))
-    notes = _notes(run, latitude_deg, horizontal, covariance)
-    shape = (stays.times - stays.times.mean()) / 3600.0
-    p = _solver(plain_design, weights)[:2] @ shape * (drift if observed and drift is not None else 1e-9)
+    # What a drift of 1 deg/h per h does to the plain result.
+    hours = _solved(stays, plain_design, (stays.time - stays.time.mean()) / 3600.0, False)
+    p = hours.coef_[:2] * (drift if observed and drift else 1e-9)
     return NorthFix(
         azimuth_deg=_azimuth(chosen),
         se_deg=_azimuth_se(chosen, covariance),
         method="drift-observing" if observed else "plain",
-        plain_deg=_azimuth(plain),
-        observed_deg=_azimuth(wide) if wide is not None else None,
+        plain_deg=_azimuth(plain[0]),
+        observed_deg=None if wide is None else _azimuth(wide[0]),
         drift_deg_h_h=drift,
-        drift_se=drift_se,
+        drift_se=None if wide is None or wide[1] is None else float(np.sqrt(wide[1][3, 3])),
         horizontal_deg_h=horizontal,
         offset_deg_h=float(chosen[2]),
         error=DriftError(float(p[0]), float(p[1]), horizontal),
         means_deg_h=stays.means,
         times_s=stays.times,
         positions=stays.positions,
-        noise_deg_h=None if stays.variance is None else float(np.sqrt(stays.variance)),
-        notes=notes,
+        noise_deg_h=_sample_noise(stays),
+        notes=_notes(run, latitude_deg, horizontal, covariance, drift),
     )
 
 
@@ -214,44 +215,51 @@ def _stays(run: Run, order_deg: Sequence[float], sense: str, settle_s: float, to
             f"{run.name}: nothing is left of some positions after {settle_s:g} s to settle; leave out less"
         )
     time, gyro = run.time[used], run.gyro_deg_h[used]
-    counts = np.bincount(stay).astype(np.float64)
-    level = float(gyro[0])
+    counts, level = np.bincount(stay), float(gyro[0])
     means = level + np.bincount(stay, weights=gyro - level) / counts
     times = np.bincount(stay, weights=time) / counts
-    residuals, offsets = gyro - means[stay], time - times[stay]
-    spread = float(offsets @ offsets)
-    slope = float(offsets @ residuals) / spread if spread > 0.0 else 0.0
-    residuals = residuals - slope * offsets
-    dof = len(time) - len(counts) - 1
-    variance = float(residuals @ residuals) / dof if dof > 0 else None
-    return _Stays(position[edges[:-1]][number], means, times, counts, variance)
+    ends = np.cumsum(counts)
+    lengths = time[ends - 1] - time[ends - counts]
+    return _Stays(position[edges[:-1]][number], means, times, lengths, time, gyro, stay)
 
 
-def _solver(design: FloatArray, weights: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.pinv(design * weights[:, None]) * weights)
+def _sample_noise(stays: _Stays) -> float | None:
+    """Deviation of a sample about its stay's mean and a drift [deg/h]; None where too few tell it."""
+    residuals, offsets = stays.gyro - stays.means[stays.stay], stays.time - stays.times[stays.stay]
+    freedom = len(stays.time) - len(stays.means) - 1
+    if freedom < 1:
+        return None
+    residuals = residuals - float(offsets @ residuals) / float(offsets @ offsets) * offsets
+    return float(np.sqrt(residuals @ residuals / freedom))
 
 
-def _fitted(
-    design: FloatArray, means: FloatArray, weights: FloatArray, variance: float | None
-) -> tuple[FloatArray, FloatArray | None]:
-    solver = _solver(design, weights)
-    if variance is None:
-        return np.asarray(solver @ means), None
-    return np.asarray(solver @ means), np.asarray(variance * (solver / weights**2) @ solver.T)
+def _columns(stays: _Stays, design: FloatArray, observes_drift: bool) -> FloatArray:
+    """Columns of every sample beside the constant: H cos(theta), H sin(theta) and, if observed, drift."""
+    turned = design[stays.stay, :2]
+    return np.column_stack((turned, (stays.time - stays.time.mean()) / 3600.0)) if observes_drift else turned
 
 
-def _tells_drift(design: FloatArray) -> bool:
-    try:
-        check_design(design, True)
-    except InputError:
-        return False
-    return True
+def _solved(stays: _Stays, design: FloatArray, values: FloatArray, observes_drift: bool) -> LinearRegressor:
+    return LinearRegressor().fit(_columns(stays, design, observes_drift), values)
 
 
-def _shows(drift: float, se: float | None, stays: _Stays) -> bool:
-    span_h = float(np.ptp(stays.times)) / 3600.0
-    round_off = _ROUND_OFF * float(np.abs(stays.means).max())
-    return abs(drift) * span_h > round_off and (se is None or abs(drift) > _SEEN * se)
+def _fitted(stays: _Stays, design: FloatArray, observes_drift: bool) -> tuple[FloatArray, FloatArray | None]:
+    """H cos(theta), H sin(theta), offset and, if observed, drift; their covariance under the gyro's noise.
+
+    None for that where the stays are too short to tell a noise, which is not taken for white: the mean of a
+    quiet gyro over a stay is as uncertain as its flicker makes it.
+    """
+    level = float(stays.gyro.mean())
+    solved = _solved(stays, design, stays.gyro - level, observes_drift)
+    rows = RunRows(_columns(stays, design, observes_drift), stays.gyro - level, stays.time)
+    step_s = float(np.median(np.diff(stays.time))) if len(stays.time) > 1 else 0.0
+    averaging_s = float(np.median(stays.lengths_s)) / ROWS_A_STAY
+    covariance = noise_covariance(
+        [rows], lambda columns: columns, solved, averaging_s if averaging_s > step_s else 0.0
+    )
+    order = [1, 2, 0, 3] if observes_drift else [1, 2, 0]
+    found = np.concatenate(([solved.intercept_ + level], solved.coef_))[order]
+    return found, None if covariance is None else covariance[np.ix_(order, order)]
 
 
 def _azimuth(found: FloatArray) -> float:
@@ -267,59 +275,33 @@ def _azimuth_se(found: FloatArray, covariance: FloatArray | None) -> float | Non
 
 
 def _notes(
-    run: Run, latitude_deg: float | None, horizontal: float, covariance: FloatArray | None
+    run: Run,
+    latitude_deg: float | None,
+    horizontal: float,
+    covariance: FloatArray | None,
+    drift: float | None,
 ) -> tuple[str, ...]:
     latitude = run.facts.latitude if latitude_deg is None else latitude_deg
+    told = (
+        []
+        if drift is not None
+        else ["the positions don't tell a drift: the standard error holds without one"]
+    )
+    if covariance is None:
+        told.append("no standard error: the samples in each position are too few, or hold no noise")
     if latitude is None:
-        return (f"no latitude is stated: the horizontal Earth rate is the one seen, {horizontal:.4g} deg/h",)
+        told.append(
+            f"no latitude is stated: the horizontal Earth rate is the one seen, {horizontal:.4g} deg/h"
+        )
+        return tuple(told)
     expected = horizontal_rate(latitude)
     tolerance = 0.02 * expected + (
         5.0 * float(np.sqrt(covariance[:2, :2].trace())) if covariance is not None else 0.0
     )
-    if abs(horizontal - expected) <= tolerance:
-        return ()
-    return (
-        f"the positions show {horizontal:.4g} deg/h of Earth rate, {expected:.4g} deg/h were expected at "
-        f"latitude {latitude:g} deg: the axis is not level, the scale factor is off, or the positions are "
-        "not what they are called",
-    )
-
-
-def simulated_positions(
-    scheme: Scheme,
-    azimuth_deg: float,
-    latitude_deg: float,
-    drift: Drift,
-    *,
-    bias_deg_h: float = 0.0,
-    random_walk_deg_sqrt_h: float = 0.0,
-    sample_s: float = 1.0,
-    seed: int = 0,
-) -> Run:
-    """A synthetic run of a scheme with a column ``position``, each sample the mean over its interval.
-
-    Samples that are not wholly in a position have position 0; the axis is not simulated on the way.
-
-    Raises
-    ------
-    InputError
-        If a stay is shorter than a sample, or the latitude is not accepted.
-    """
-    if not (np.isfinite(sample_s) and 0.0 < sample_s <= scheme.dwell_s):
-        raise InputError(f"sample interval {sample_s:g} s: above 0 and no longer than the dwell is needed")
-    begin, end = scheme.spans_s
-    count = int(np.ceil((end[-1] - begin[0]) / sample_s - 1e-9))
-    start = begin[0] + sample_s * np.arange(count)
-    stay = np.searchsorted(begin, start + 1e-9, side="right") - 1
-    inside = start + sample_s <= end[stay] + 1e-9
-    order = list(dict.fromkeys(scheme.order_deg))
-    numbers = np.array([order.index(angle) + 1 for angle in scheme.order_deg], dtype=np.float64)
-    outputs = scheme.outputs(azimuth_deg, horizontal_rate(latitude_deg))[stay]
-    gyro = np.where(inside, outputs, 0.0) + bias_deg_h + drift.mean(start, start + sample_s)
-    noise = random_walk_deg_sqrt_h / np.sqrt(sample_s / 3600.0)
-    gyro += noise * np.random.default_rng(seed).standard_normal(count)
-    facts = Facts(
-        unit="synthetic", latitude=latitude_deg, powered_on=0.0, notes="synthetic: simulated positions"
-    )
-    columns = {"time": start, "gyro": gyro, "position": np.where(inside, numbers[stay], 0.0)}
-    return Run("synthetic positions", columns, facts)
+    if abs(horizontal - expected) > tolerance:
+        told.append(
+            f"the positions show {horizontal:.4g} deg/h of Earth rate, {expected:.4g} deg/h were expected "
+            f"at latitude {latitude:g} deg: the axis is not level, the scale factor is off, or the positions "
+            "are not what they are called"
+        )
+    return tuple(told)

@@ -30,6 +30,9 @@ _LIGHT = 1e-4
 """Weight below which a model no longer counts."""
 _INDEPENDENT = 1e-9
 """Columns whose singular value is below this share of the largest hold nothing new."""
+SLOWEST_CORNER_HZ = 1e-5
+"""Lowest frequency, a day's, at which flicker or walk may equal the white noise, however short the rows are:
+of a gyro it is between 1e-5 and 1e-2 Hz, and minutes of rows are white as a rule."""
 _OCTAVES_BEYOND = 2
 """Octaves above the highest frequency at which flicker or walk may still equal the white noise."""
 
@@ -83,7 +86,7 @@ def noise_of_rows(table: TrainingTable) -> RowNoise | None:
     -----
     What moves a run as a whole from one to the next is no part of it. A form that is wrong leaves residuals
     that count as slow noise. Beforehand, flicker is as likely there as not, and so is the walk; the frequency
-    at which one that is there equals the white noise is as likely in any octave that the rows reach.
+    at which one that is there equals the white noise is as likely in any octave, from a day's on.
     """
     if len(table) < 3:
         return None
@@ -96,7 +99,7 @@ def noise_of_rows(table: TrainingTable) -> RowNoise | None:
     spectrum = spectrum_of([table.y[p] for p in parts], step_s, [columns[p] for p in parts])
     if not np.any(spectrum.power > 0.0):
         return None
-    lowest, half = float(spectrum.frequency_hz.min()), 0.5 / step_s
+    lowest, half = min(float(spectrum.frequency_hz.min()), SLOWEST_CORNER_HZ), 0.5 / step_s
     corners = lowest * 2.0 ** np.arange(np.log2(half / lowest) + _OCTAVES_BEYOND + 1.0)
     flicker = np.concatenate(([0.0], 2.0 * np.pi * corners))
     walk = np.concatenate(([0.0], 4.0 * np.pi**2 * corners**2))
@@ -149,7 +152,7 @@ ROWS = 8192
 
 
 def noise_covariance(
-    rows: Sequence[RunRows], compose: Compose, regressor: LinearRegressor
+    rows: Sequence[RunRows], compose: Compose, regressor: LinearRegressor, averaging_s: float | None = None
 ) -> FloatArray | None:
     """Covariance of (intercept, coefficients), shape (k + 1, k + 1), for noise of the residuals' spectrum.
 
@@ -164,6 +167,8 @@ def noise_covariance(
         Columns from atoms.
     regressor
         Fitted to them.
+    averaging_s
+        What the noise is told from are means over this time [s]; by default as many rows as `ROWS`.
 
     Returns
     -------
@@ -175,7 +180,8 @@ def noise_covariance(
     What else moves a run as a whole from one to the next is no part of it. Flicker slower than the run moves
     its constant in one piece, which no run shows: it is taken to go on to `fogml.signals.flicker.LONGEST_S`.
     """
-    averaging_s = 0.0 if sum(len(part.y) for part in rows) <= ROWS else recorded_s(rows) / ROWS
+    if averaging_s is None:
+        averaging_s = 0.0 if sum(len(part.y) for part in rows) <= ROWS else recorded_s(rows) / ROWS
     table = averaged_table(rows, compose, averaging_s)
     noise = noise_of_rows(table)
     if noise is None:

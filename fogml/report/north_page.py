@@ -42,12 +42,15 @@ def _recorded_verdict(values: Mapping[str, Any]) -> list[str]:
     sentences = [f"The azimuth is {values['azimuth_deg']:.4f}{within} deg."]
     if values["method"] == "drift-observing":
         sentences.append(
-            f"A drift of {number(values['drift_deg_h_per_h'])} deg/h per h shows and is taken out; without "
-            f"that the azimuth would be off by {number(values['error_deg'])} deg."
+            f"A linear drift of {number(values['drift_deg_h_per_h'])} ± {number(values['drift_se'], 2)} deg/h "
+            f"per h is taken out; a plain seek is {number(values['error_deg'])} deg from this one."
         )
     elif values["drift_deg_h_per_h"] is not None:
+        sentences.append("The standard error of a plain seek holds only where the bias does not drift.")
+    if values["se"] is not None:
         sentences.append(
-            "No linear drift shows beyond noise, so the plain seek holds: it has the least noise."
+            "The standard error is of the gyro's noise, flicker and random walk as the stays tell them; it does "
+            "not hold a bias that bends, as at start-up, and errors of the table's angles and level."
         )
     return sentences
 

@@ -1,0 +1,154 @@
+"""Scale factors from a rate table against true ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.lab_uncertainty.measure import Told, coverage, of_errors
+from experiments.lab_uncertainty.signals import Noise, kept_rows, lagged, thermometer
+from fogml.arrays import FloatArray
+from fogml.lab.rate_json import rate_json
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+
+TACTICAL, NAVIGATION = Noise(0.02, 0.05, 0.05), Noise(0.001, 0.002, 0.005)
+UP = (0.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+BOTH = tuple(sign * rate for rate in UP[1:] for sign in (1.0, -1.0))
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Rates of a table [deg/s], and what gyro, table and logger do.
+
+    Dwell and settling of gyro and table [s], scale factor's cubic part (share at the greatest rate, deviation
+    of a normal one) and asymmetry likewise [ppm], sensitivity to temperature [ppm/degC] and the soaks [degC].
+    """
+
+    noise: Noise
+    rates: tuple[float, ...] = (0.0, *BOTH, 0.0)
+    dwell_s: float = 60.0
+    sample_s: float = 1.0
+    settle_s: float = 0.3
+    cubic_ppm: float = 0.0
+    asymmetry_ppm: float = 0.0
+    sensitivity_ppm: float = 0.0
+    soaks: tuple[float, ...] = ()
+    bias_slope: float = 0.0
+    table_ppm: float = 0.0
+    dropped: float = 0.0
+
+
+CASES = {
+    "tactical": Ladder(TACTICAL),
+    "navigation grade": Ladder(NAVIGATION),
+    "navigation grade, 5 min a rate": Ladder(NAVIGATION, dwell_s=300.0),
+    "navigation grade, up and down": Ladder(
+        NAVIGATION, rates=(*(-r for r in UP[:0:-1]), *UP, *UP[::-1], *(-r for r in UP[1:]))
+    ),
+    "navigation grade, each rate once, up": Ladder(NAVIGATION, rates=(*(-r for r in UP[:0:-1]), *UP)),
+    "navigation grade, three rates": Ladder(NAVIGATION, rates=(0.0, 10.0, -10.0, 0.0)),
+    "navigation grade, nonlinear": Ladder(NAVIGATION, cubic_ppm=20.0),
+    "navigation grade, asymmetric": Ladder(NAVIGATION, asymmetry_ppm=20.0),
+    "table's rates off by 5 ppm": Ladder(NAVIGATION, table_ppm=5.0),
+    "100 Hz, counts of 1 arcsec, rows dropped": Ladder(
+        Noise(0.005, 0.01, 0.01, 1.0), sample_s=0.01, dwell_s=20.0, dropped=0.02
+    ),
+    "five soaks, bias drifts with temperature": Ladder(
+        TACTICAL,
+        rates=(0.0, 10.0, -10.0, 0.0, 20.0, -20.0, 0.0),
+        sensitivity_ppm=2.0,
+        soaks=(-40.0, -15.0, 10.0, 35.0, 60.0),
+        bias_slope=0.02,
+    ),
+    "three soaks": Ladder(
+        TACTICAL,
+        rates=(0.0, 10.0, -10.0, 0.0),
+        sensitivity_ppm=2.0,
+        soaks=(-40.0, 10.0, 60.0),
+        bias_slope=0.02,
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Scale factor, its line's nonlinearity and asymmetry [ppm], and sensitivity [ppm/degC]."""
+
+    scale: float
+    nonlinearity: float
+    asymmetry: float
+    sensitivity: float
+
+
+def recorded(ladder: Ladder, rng: np.random.Generator) -> tuple[Run, Truth]:
+    """A run and what is true of it."""
+    rows, step = round(ladder.dwell_s / ladder.sample_s), ladder.sample_s
+    soaks = ladder.soaks or (25.0,)
+    rest = round(3600.0 / step) if ladder.soaks else 0
+    commanded, warmth = [], []
+    for place, soak in enumerate(soaks):
+        before = soaks[max(place - 1, 0)]
+        commanded += [np.zeros(rest), np.repeat(ladder.rates, rows)]
+        ramp = np.clip(np.arange(rest) * step / 1800.0, 0.0, 1.0)
+        warmth += [before + (soak - before) * ramp, np.full(rows * len(ladder.rates), soak)]
+    rate, temperature = np.concatenate(commanded), np.concatenate(warmth)
+    scale = 1.0 + 1e-6 * rng.normal(0.0, 100.0)
+    cubic, asymmetry, sensitivity = (
+        size * rng.standard_normal()
+        for size in (ladder.cubic_ppm, ladder.asymmetry_ppm, ladder.sensitivity_ppm)
+    )
+    greatest = np.abs(rate).max()
+    off = {value: ladder.table_ppm * rng.standard_normal() for value in np.unique(rate)}
+    table = rate * (1.0 + 1e-6 * np.array([off[value] for value in rate]))
+    coil = thermometer(rng, temperature, step, 300.0, 1e-6)
+
+    def output(values: FloatArray) -> FloatArray:
+        parts = cubic * (values / greatest) ** 2 + 0.5 * asymmetry * np.sign(values)
+        return np.asarray(3600.0 * values * (scale + 1e-6 * parts))
+
+    time = step * (np.arange(len(rate)) + 1.0)
+    gyro = output(lagged(table, step, ladder.settle_s)) * (1.0 + 1e-6 * sensitivity * (coil - coil.mean()))
+    gyro += rng.normal(0.0, 0.5) + ladder.bias_slope * coil + ladder.noise.draw(rng, len(rate), step)
+    gyro = ladder.noise.counted(gyro, step)
+    kept = kept_rows(rng, len(rate), ladder.dropped)
+    columns = {"time": time, "rate": rate, "gyro": gyro}
+    if ladder.soaks:
+        columns["T"] = thermometer(rng, temperature, step, 120.0, 1.0 / 16.0)
+    levels = np.array(ladder.rates)
+    line = np.column_stack([np.ones(len(levels)), levels])
+    truth = np.linalg.lstsq(line, output(levels) / 3600.0, rcond=None)[0][1]
+    unique = np.unique(levels)
+    line, bent = np.column_stack([np.ones(len(unique)), unique]), output(unique) / 3600.0
+    left = bent - line @ np.linalg.lstsq(line, bent, rcond=None)[0]
+    return Run("ladder", {name: part[kept] for name, part in columns.items()}, Facts()), Truth(
+        float(truth), float(1e6 * np.abs(left).max() / np.abs(bent).max()), float(asymmetry), sensitivity
+    )
+
+
+def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
+    """Rows of one case."""
+    ladder = CASES[name]
+    told: dict[str, list[Told | None]] = {"scale factor": [], "nonlinearity [ppm]": [], "asymmetry [ppm]": []}
+    if ladder.soaks:
+        told = {"sensitivity [ppm/degC]": []}
+    for repeat in range(repeats):
+        run, truth = recorded(ladder, np.random.default_rng([seed, repeat]))
+        values = rate_json([run], source="synthetic", settle_s=3.0 * ladder.sample_s + 5.0 * ladder.settle_s)
+        line, sensed = values["scale_factor"], values["temperature_sensitivity"]
+        if ladder.soaks:
+            told["sensitivity [ppm/degC]"].append(
+                None
+                if sensed is None
+                else of_errors(sensed["ppm_per_degC"] - truth.sensitivity, sensed["se"])
+            )
+            continue
+        told["scale factor"].append(of_errors(line["scale_factor"] - truth.scale, line["se"]))
+        for key in ("nonlinearity", "asymmetry"):
+            value = line[f"{key}_ppm"]
+            told[f"{key} [ppm]"].append(
+                None if value is None else of_errors(value - getattr(truth, key), line.get(f"{key}_se_ppm"))
+            )
+    return [coverage(name, quantity, every) for quantity, every in told.items()]
