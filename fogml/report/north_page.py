@@ -43,7 +43,7 @@ def _recorded_verdict(values: Mapping[str, Any]) -> list[str]:
     drift = values["drift_deg_h_per_h"]
     if values["method"] == "drift-observing":
         sentences.append(
-            f"A linear drift of {number(drift)} ± {number(values["drift_se"], 2)} deg/h "
+            f"A linear drift of {number(drift)} ± {number(values['drift_se'], 2)} deg/h "
             f"per h is taken out; a plain seek is {number(values['error_deg'])} deg from this one."
         )
     elif drift is not None:
