@@ -180,15 +180,16 @@ def available_cores() -> int:
 
 
 def one_thread(api: Literal["blas", "openmp"]) -> Any:
-    """A context in which calls of BLAS, or OpenMP, use one thread each.
+    """A context in which calls of BLAS, or OpenMP, use one thread each."""
+    return _controller(frozenset(filter(sys.modules.__contains__, _POOLED))).limit(limits=1, user_api=api)
 
-    It knows the libraries that were loaded when it was first asked for.
-    """
-    return _controller(api).limit(limits=1, user_api=api)
+
+_POOLED = frozenset(("numpy", "scipy.linalg", "sklearn", "torch"))
+"""Libraries that bring pools of threads of their own."""
 
 
 @cache
-def _controller(api: str) -> Any:
+def _controller(loaded: frozenset[str]) -> Any:
     # Looking the libraries up takes milliseconds; they stay where they are.
     from threadpoolctl import ThreadpoolController
 

@@ -8,7 +8,7 @@ which a microcontroller looks up at every sample.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -66,31 +66,31 @@ class Slices:
 
     def excess(self, atoms: FloatArray) -> FloatArray:
         """How far beyond the range of their slice atoms (n, a) lie, as a share of its span, shape (n, c)."""
-        place, values = self._placed(atoms)
+        place, values = self._place(atoms), np.column_stack(list(self._inputs(atoms)))
         away = np.maximum(self.low[:, place].T - values, values - self.high[:, place].T) / self.span
         return np.maximum(away, 0.0)
 
     def outside(self, atoms: FloatArray) -> BoolArray:
         """Rows (n,) of atoms (n, a) with an input beyond the range of its slice; said of full windows."""
-        place, values = self._placed(atoms)
+        place = self._place(atoms)
         lowest, highest = self.bounds
         found = np.zeros(len(atoms), dtype=np.bool_)
-        for value, low, high in zip(values.T, lowest, highest, strict=True):
+        for value, low, high in zip(self._inputs(atoms), lowest, highest, strict=True):
             found |= (value < low[place]) | (value > high[place])
         return found
 
-    def _placed(self, atoms: FloatArray) -> tuple[IndexArray, FloatArray]:
-        """Slice of each row (n,), and the inputs' values (n, c)."""
-        count = self.low.shape[1]
-        share = np.clip((atoms[:, self.level] - self.first) / self.width, 0.0, count - 1.0)
-        return share.astype(np.intp), self._inputs(atoms)
+    def _place(self, atoms: FloatArray) -> IndexArray:
+        """Slice of each row (n,)."""
+        share = (atoms[:, self.level] - self.first) / self.width
+        return np.clip(share, 0.0, self.low.shape[1] - 1.0, out=share).astype(np.intp)
 
-    def _inputs(self, atoms: FloatArray) -> FloatArray:
-        pairs = zip(self.of, self.less, strict=True)
-        return np.column_stack([atoms[:, i] if j < 0 else atoms[:, i] - atoms[:, j] for i, j in pairs])
+    def _inputs(self, atoms: FloatArray) -> Iterator[FloatArray]:
+        """Values (n,) of each input."""
+        for i, j in zip(self.of, self.less, strict=True):
+            yield atoms[:, i] if j < 0 else atoms[:, i] - atoms[:, j]
 
     @classmethod
-    def learn(cls, atoms: Sequence[Atom], parts: Iterable[tuple[FloatArray, BoolArray]]) -> Slices | None:
+    def learn(cls, atoms: Sequence[Atom], parts: Sequence[tuple[FloatArray, BoolArray]]) -> Slices | None:
         """The slices of training rows: atom values (n, a) with the rows marked full (n,); None if none apply.
 
         A slice that no row fell in has the range of those beside it together.
@@ -98,22 +98,25 @@ class Slices:
         level, pairs = _inputs_of(atoms)
         if level is None or not pairs:
             return None
-        values = np.concatenate([part if full.all() else part[full] for part, full in parts])
-        sliced = values[:, level]
-        first, last = float(sliced.min()), float(sliced.max())
+        trained = [values if full.all() else values[full] for values, full in parts if full.any()]
+        if not trained:
+            return None
+        first = min(float(values[:, level].min()) for values in trained)
+        last = max(float(values[:, level].max()) for values in trained)
         width = (last - first) / SLICES
         if not width > 1e-9 * max(1.0, abs(first), abs(last)):
             return None
         of, less = zip(*pairs, strict=True)
         empty = np.full((len(of), SLICES), np.inf)
         slices = cls(level, first, width, of, less, empty, -empty)
-        place, inputs = slices._placed(values)
-        # Of small numbers a stable sort is a radix sort.
-        order = np.argsort(place.astype(np.uint8), kind="stable")
-        filled, starts = np.unique(place[order], return_index=True)
-        for column, value in enumerate(inputs.T):
-            slices.low[column, filled] = np.minimum.reduceat(value[order], starts)
-            slices.high[column, filled] = np.maximum.reduceat(value[order], starts)
+        for values in trained:
+            place = slices._place(values)
+            # Temperature is slow: thousands of rows follow each other in a slice.
+            starts = np.flatnonzero(np.diff(place, prepend=-1))
+            for low, high, value in zip(slices.low, slices.high, slices._inputs(values), strict=True):
+                np.minimum.at(low, place[starts], np.minimum.reduceat(value, starts))
+                np.maximum.at(high, place[starts], np.maximum.reduceat(value, starts))
+        filled = np.flatnonzero(np.isfinite(slices.low[0]))
         beside = np.searchsorted(filled, np.arange(SLICES))
         after, before = filled[beside], filled[np.maximum(beside - 1, 0)]
         hole = ~np.isin(np.arange(SLICES), filled)

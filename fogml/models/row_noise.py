@@ -16,6 +16,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.models.linear import LinearRegressor
 from fogml.models.table import Compose, RunRows, TrainingTable, averaged_table, recorded_s
+from fogml.processes import one_thread
 from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
@@ -28,11 +29,11 @@ _FEWEST = 8
 """Degrees of freedom that columns must leave for a noise to be told."""
 _LIGHT = 1e-4
 """Weight below which a model no longer counts."""
-_INDEPENDENT = 1e-9
-"""Columns whose singular value is below this share of the largest hold nothing new."""
 SLOWEST_CORNER_HZ = 1e-5
 """Lowest frequency, a day's, at which flicker or walk may equal the white noise, however short the rows are:
 of a gyro it is between 1e-5 and 1e-2 Hz, and minutes of rows are white as a rule."""
+_AT_ONCE = 16
+"""Models weighed together."""
 _OCTAVES_BEYOND = 2
 """Octaves above the highest frequency at which flicker or walk may still equal the white noise."""
 
@@ -116,23 +117,24 @@ def _weighed(spectrum: Spectrum, ratios: FloatArray, beforehand: FloatArray) -> 
     shapes = term_shapes(spectrum.frequency_hz, spectrum.sample_s, SpectrumTerms(("N", "B", "K")))
     shapes = shapes.mean(axis=1)
     single = len(spectrum.values)
-    left, strength, _ = np.linalg.svd(spectrum.columns, full_matrices=False)
-    basis = left[:, strength > _INDEPENDENT * strength.max(initial=0.0)]
+    basis, _ = spectrum.basis
     freedom = float(spectrum.count.sum()) - basis.shape[1]
     if freedom < _FEWEST:
         return None
     likelihood, squares = np.empty(len(ratios)), np.empty(len(ratios))
-    for place, ratio in enumerate(ratios):
-        density = shapes @ ratio
-        weight = 1.0 / density[:single]
-        weighed = basis * weight[:, None]
-        root = np.linalg.cholesky(basis.T @ weighed)
-        along = np.linalg.solve(root, weighed.T @ spectrum.values)
-        square = float(weight @ spectrum.values**2 - along @ along)
-        square += float(spectrum.count[single:] @ (spectrum.power[single:] / density[single:]))
-        squares[place] = max(square, 1e-300) / freedom
-        logarithms = float(spectrum.count @ np.log(density)) + 2.0 * float(np.log(np.diag(root)).sum())
-        likelihood[place] = -0.5 * (logarithms + freedom * np.log(squares[place]))
+    for first in range(0, len(ratios), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        density = ratios[some] @ shapes.T
+        weight = 1.0 / density[:, :single]
+        weighed = basis.T * weight[:, None, :]
+        root = np.linalg.cholesky(weighed @ basis)
+        along = np.linalg.solve(root, (weighed @ spectrum.values)[..., None])
+        square = weight @ spectrum.values**2 - np.sum(along**2, axis=(1, 2))
+        square += (1.0 / density[:, single:]) @ (spectrum.count[single:] * spectrum.power[single:])
+        squares[some] = np.maximum(square, 1e-300) / freedom
+        logarithms = np.log(density) @ spectrum.count
+        logarithms += 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+        likelihood[some] = -0.5 * (logarithms + freedom * np.log(squares[some]))
     likelihood += beforehand
     weights = np.exp(likelihood - likelihood.max())
     live = weights > _LIGHT
@@ -183,9 +185,13 @@ def noise_covariance(
     if averaging_s is None:
         averaging_s = 0.0 if sum(len(part.y) for part in rows) <= ROWS else recorded_s(rows) / ROWS
     table = averaged_table(rows, compose, averaging_s)
-    noise = noise_of_rows(table)
-    if noise is None:
-        return None
+    # Products of some hundred rows: threads within BLAS would only wait for each other.
+    with one_thread("blas"):
+        noise = noise_of_rows(table)
+        return None if noise is None else _sandwich(table, noise, regressor)
+
+
+def _sandwich(table: TrainingTable, noise: RowNoise, regressor: LinearRegressor) -> FloatArray:
     scale = np.std(table.X, axis=0)
     scale[scale == 0.0] = 1.0
     shift = table.X.mean(axis=0) if regressor.fit_intercept else np.zeros(len(scale))

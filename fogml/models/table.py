@@ -14,7 +14,7 @@ from fogml.models.folds import dealt_blocks
 from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
-from fogml.signals.averages import block_averages
+from fogml.signals.averages import block_averages, window_means
 
 Compose = Callable[[FloatArray], FloatArray]
 """Gives the columns of a model, shape (m, k), from rows of atom values, shape (m, a)."""
@@ -207,8 +207,6 @@ def _averages(
 
     The features are averaged, not their atoms: the mean of T**2 is not the square of the mean.
     """
-    from scipy.sparse import csr_array
-
     means = block_averages(part.time_s, part.y, window_s=averaging_s)
     width = compose(part.atoms[:1]).shape[1]
     if len(means) == 0:
@@ -218,13 +216,5 @@ def _averages(
     for start in range(0, len(means), per_piece):
         starts, stops = means.starts[start : start + per_piece], means.stops[start : start + per_piece]
         composed = compose(part.atoms[starts[0] : stops[-1]])
-        counts = stops - starts
-        # Row i of the operator holds 1/count over the samples of window i.
-        samples = np.repeat(starts - starts[0] - np.concatenate(([0], counts.cumsum()[:-1])), counts)
-        samples += np.arange(len(samples))
-        operator = csr_array(
-            (np.repeat(1.0 / counts, counts), samples, np.concatenate(([0], counts.cumsum()))),
-            shape=(len(counts), len(composed)),
-        )
-        pieces.append(operator @ composed)
+        pieces.append(window_means(composed, starts - starts[0], stops - starts[0]))
     return np.concatenate(pieces), means.values[0], means.time_s

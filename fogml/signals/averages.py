@@ -90,8 +90,8 @@ def block_averages(
     starts, stops = _windows(time, float(window_s), start)
     counts = stops - starts
     return BlockAverages(
-        time_s=_means(time, starts, stops),
-        values=tuple(_means(array, starts, stops) for array in arrays),
+        time_s=window_means(time, starts, stops),
+        values=tuple(window_means(array, starts, stops) for array in arrays),
         counts=counts,
         starts=starts,
         stops=stops,
@@ -124,7 +124,11 @@ def _windows(time: FloatArray, window_s: float, start: float | None) -> tuple[In
     return (starts[full] + first).astype(np.intp), (stops[full] + first).astype(np.intp)
 
 
-def _means(values: FloatArray, starts: IndexArray, stops: IndexArray) -> FloatArray:
+def window_means(values: FloatArray, starts: IndexArray, stops: IndexArray) -> FloatArray:
+    """Means of the samples ``starts[i]:stops[i]`` of values of shape (n,) or (n, k); no window is empty.
+
+    Windows follow each other and don't overlap; samples between them are left out.
+    """
     if len(starts) == 0:
         return np.empty((0, *values.shape[1:]))
     # Without its first value, a time or a rate far from zero loses no digits in the sums.
