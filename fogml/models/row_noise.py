@@ -25,6 +25,10 @@ from fogml.signals.whitening import Whitener
 
 _GAP = 1.5
 """Steps longer than this many usual ones part a run."""
+BRIDGED_SHARE = 0.05
+"""Rows that straight lines over gaps may add, the shortest gaps first, as a share of those there are. Without
+them a dropped row or a turn of the table ends a stretch, and noise slower than that is not seen; the lines
+take no more than this share of the fast noise."""
 _FEWEST = 8
 """Degrees of freedom that columns must leave for a noise to be told."""
 _LIGHT = 1e-4
@@ -75,6 +79,41 @@ def stretches_of(table: TrainingTable) -> tuple[list[slice], float]:
     return [slice(int(p[0]), int(p[-1]) + 1) for p in np.split(np.arange(len(table)), cuts)], step_s
 
 
+def _bridged(table: TrainingTable, values: FloatArray) -> tuple[list[FloatArray], float]:
+    """Stretches of three values or more over even rows, lines bridging short gaps; and the step [s]."""
+    parts, step_s = stretches_of(table)
+    pairs = list(pairwise(parts))
+    lacking = np.array([_rows_apart(table, last, part, step_s) - 1.0 for last, part in pairs])
+    order = np.argsort(lacking, kind="stable")
+    bridged = np.zeros(len(pairs), dtype=np.bool_)
+    bridged[order] = np.cumsum(lacking[order]) <= BRIDGED_SHARE * len(table)
+    groups = [[parts[0]]]
+    for part, joined in zip(parts[1:], bridged.tolist()):
+        if joined:
+            groups[-1].append(part)
+        else:
+            groups.append([part])
+    found = []
+    for group in groups:
+        rows = slice(group[0].start, group[-1].stop)
+        steps = np.maximum(np.round(np.diff(table.time_s[rows]) / step_s), 1.0)
+        place = np.concatenate(([0.0], np.cumsum(steps)))
+        every = np.arange(place[-1] + 1.0)
+        if len(every) == len(place):
+            found.append(values[rows])
+        else:
+            found.append(np.column_stack([np.interp(every, place, one) for one in values[rows].T]))
+    return [one for one in found if len(one) >= 3], step_s
+
+
+def _rows_apart(table: TrainingTable, last: slice, part: slice, step_s: float) -> float:
+    """From the end of a stretch to the begin of another, in steps; infinite from run to run."""
+    before, after = last.stop - 1, part.start
+    if table.run_index[before] != table.run_index[after]:
+        return np.inf
+    return max(float(np.round((table.time_s[after] - table.time_s[before]) / step_s)), 1.0)
+
+
 def noise_of_rows(table: TrainingTable) -> RowNoise | None:
     """Noise of a table's values beside its columns and a constant of each stretch; None where they tell none.
 
@@ -91,13 +130,12 @@ def noise_of_rows(table: TrainingTable) -> RowNoise | None:
     """
     if len(table) < 3:
         return None
-    parts, step_s = stretches_of(table)
-    parts = [part for part in parts if part.stop - part.start >= 3]
     scale = np.std(table.X, axis=0)
     columns = (table.X - table.X.mean(axis=0)) / np.where(scale > 0.0, scale, 1.0)
+    parts, step_s = _bridged(table, np.column_stack((table.y, columns)))
     if not parts:
         return None
-    spectrum = spectrum_of([table.y[p] for p in parts], step_s, [columns[p] for p in parts])
+    spectrum = spectrum_of([part[:, 0] for part in parts], step_s, [part[:, 1:] for part in parts])
     if not np.any(spectrum.power > 0.0):
         return None
     lowest, half = min(float(spectrum.frequency_hz.min()), SLOWEST_CORNER_HZ), 0.5 / step_s

@@ -68,6 +68,18 @@ def test_runs_stretches_and_a_ridge() -> None:
     assert noise_covariance(short, lambda atoms: atoms, whole) is None
 
 
+def test_dropped_rows_hide_no_slow_noise() -> None:
+    rng = np.random.default_rng(4)
+    y = COLUMNS @ TRUE[1:] + 0.05 * np.cumsum(rng.normal(size=N)) + rng.normal(size=N)
+    model = LinearRegressor().fit(COLUMNS, y)
+    kept = rng.random(N) > 0.03
+    whole, dropped = (
+        np.sqrt(np.diag(noise_covariance([RunRows(COLUMNS[k], y[k], TIME[k])], lambda atoms: atoms, model)))
+        for k in (slice(None), kept)
+    )
+    np.testing.assert_allclose(dropped, whole, rtol=0.2)
+
+
 def turning_run(seed: int) -> tuple[Run, np.ndarray]:
     """A cycle with turns both ways at a scale factor that is exact, with slow noise; and the noise."""
     time = 10.0 * np.arange(1440)
