@@ -25,10 +25,10 @@ from fogml.signals.whitening import Whitener
 
 _GAP = 1.5
 """Steps longer than this many usual ones part a run."""
-BRIDGED_SHARE = 0.05
-"""Rows that straight lines over gaps may add, the shortest gaps first, as a share of those there are. Without
-them a dropped row or a turn of the table ends a stretch, and noise slower than that is not seen; the lines
-take no more than this share of the fast noise."""
+SKIPPED_SHARE = 0.05
+"""Rows lacking in gaps that are passed over, the shortest first, as a share of those there are. Were a stretch
+to end with each dropped row or turn of the table, slower noise would not be seen. So white noise stays white,
+and slow noise is sped up by this share."""
 _FEWEST = 8
 """Degrees of freedom that columns must leave for a noise to be told."""
 _LIGHT = 1e-4
@@ -79,31 +79,16 @@ def stretches_of(table: TrainingTable) -> tuple[list[slice], float]:
     return [slice(int(p[0]), int(p[-1]) + 1) for p in np.split(np.arange(len(table)), cuts)], step_s
 
 
-def _bridged(table: TrainingTable, values: FloatArray) -> tuple[list[FloatArray], float]:
-    """Stretches of three values or more over even rows, lines bridging short gaps; and the step [s]."""
+def _joined(table: TrainingTable) -> tuple[list[slice], float]:
+    """Stretches of three rows or more, those across short gaps as one; and the step [s]."""
     parts, step_s = stretches_of(table)
-    pairs = list(pairwise(parts))
-    lacking = np.array([_rows_apart(table, last, part, step_s) - 1.0 for last, part in pairs])
+    lacking = np.array([_rows_apart(table, *pair, step_s) - 1.0 for pair in pairwise(parts)])
     order = np.argsort(lacking, kind="stable")
-    bridged = np.zeros(len(pairs), dtype=np.bool_)
-    bridged[order] = np.cumsum(lacking[order]) <= BRIDGED_SHARE * len(table)
-    groups = [[parts[0]]]
-    for part, joined in zip(parts[1:], bridged.tolist()):
-        if joined:
-            groups[-1].append(part)
-        else:
-            groups.append([part])
-    found = []
-    for group in groups:
-        rows = slice(group[0].start, group[-1].stop)
-        steps = np.maximum(np.round(np.diff(table.time_s[rows]) / step_s), 1.0)
-        place = np.concatenate(([0.0], np.cumsum(steps)))
-        every = np.arange(place[-1] + 1.0)
-        if len(every) == len(place):
-            found.append(values[rows])
-        else:
-            found.append(np.column_stack([np.interp(every, place, one) for one in values[rows].T]))
-    return [one for one in found if len(one) >= 3], step_s
+    cut = np.ones(len(lacking), dtype=np.bool_)
+    cut[order] = np.cumsum(lacking[order]) > SKIPPED_SHARE * len(table)
+    starts = [0, *(part.start for part, apart in zip(parts[1:], cut.tolist(), strict=True) if apart)]
+    every = [slice(start, stop) for start, stop in pairwise([*starts, len(table)])]
+    return [part for part in every if part.stop - part.start >= 3], step_s
 
 
 def _rows_apart(table: TrainingTable, last: slice, part: slice, step_s: float) -> float:
@@ -132,10 +117,10 @@ def noise_of_rows(table: TrainingTable) -> RowNoise | None:
         return None
     scale = np.std(table.X, axis=0)
     columns = (table.X - table.X.mean(axis=0)) / np.where(scale > 0.0, scale, 1.0)
-    parts, step_s = _bridged(table, np.column_stack((table.y, columns)))
+    parts, step_s = _joined(table)
     if not parts:
         return None
-    spectrum = spectrum_of([part[:, 0] for part in parts], step_s, [part[:, 1:] for part in parts])
+    spectrum = spectrum_of([table.y[p] for p in parts], step_s, [columns[p] for p in parts])
     if not np.any(spectrum.power > 0.0):
         return None
     lowest, half = min(float(spectrum.frequency_hz.min()), SLOWEST_CORNER_HZ), 0.5 / step_s
