@@ -26,9 +26,10 @@ from fogml.signals.whitening import Whitener
 _GAP = 1.5
 """Steps longer than this many usual ones part a run."""
 SKIPPED_SHARE = 0.05
-"""Rows lacking in gaps that are passed over, the shortest first, as a share of those there are. Were a stretch
-to end with each dropped row or turn of the table, slower noise would not be seen. So white noise stays white,
-and slow noise is sped up by this share."""
+"""Rows lacking in gaps that are passed over, the shortest first, as a share of those there are.
+
+Were a stretch to end with each dropped row or turn of the table, slower noise would not be seen. So white
+noise stays white, and slow noise is sped up by this share."""
 _FEWEST = 8
 """Degrees of freedom that columns must leave for a noise to be told."""
 _LIGHT = 1e-4
