@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.causes import cards_of, onset
+from fogml.gap.diagnosis import _closed_share
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import infer
 from fogml.gap.model import TwinModel
@@ -45,6 +46,18 @@ def test_what_stands_in_for_a_name_has_none_of_its_class(found):
         assert not names & set(other.key)
         assert other.score < best.score
     assert found.search.without(best, names).log_prior == pytest.approx(0.0)
+
+
+def test_what_stands_in_for_a_name_may_be_two_unknown_families(found):
+    """A smooth past and what differs between places: neither alone explains as much."""
+    search, best = found.search, found.explanations[0]
+    names = search.names(best)
+    sets = search.unexplained(best, names)
+    one = search._refined(search.without(best, names))
+    alone = search._each_more(one, search.families_of("unknown"))
+    assert len(sets[0].members) == 2
+    assert sets[0].score > max(search._refined(e).score for e in alone.values())
+    assert [e.score for e in sets] == sorted((e.score for e in sets), reverse=True)
 
 
 def test_a_name_is_exchanged_for_each_that_explains_nearly_as_much(found):
@@ -122,6 +135,17 @@ def test_members_of_a_class_are_told_apart_at_the_sizes_that_they_would_have(fou
     assert ahead.next_run(found, judged, [alone], (), 3, print) is None
 
 
+def test_what_causes_close_is_nothing_where_the_gap_is_no_more_than_noise(found):
+    foretold = Foretold.of(found, found.explanations[0].members, found.explanations[0].members)
+    closed = _closed_share(found, foretold)
+    assert 0.5 < closed <= 1.0
+    assert _closed_share(found, SimpleNamespace(members=())) == 0.0
+    field = copy.copy(found.field)
+    quiet = field.base.data / np.linalg.norm(field.base.data)
+    field.base = replace(field.base, data=quiet)
+    assert _closed_share(SimpleNamespace(field=field), foretold) == 0.0
+
+
 def test_noise_beside_what_was_found_is_the_twins(found):
     white = found.field.whitening.noise.N
     assert white == pytest.approx(load_twin("tactical").noise.N, rel=0.1)
@@ -144,3 +168,30 @@ def test_each_unknown_gives_the_same_blocks_on_every_run(found):
             [b.columns.shape[1] for b in family.build(r, scene, found.setting.values)] for r in scene.runs
         ]
         assert widths[0] == widths[1]
+
+
+@pytest.mark.parametrize(("moves", "recorded"), [(True, False), (False, True)])
+def test_an_unknown_of_the_angle_is_told_where_the_table_turns_or_the_angle_is_recorded(moves, recorded):
+    count, angle = 60, np.linspace(0.0, 170.0, 60)
+
+    class Turning:
+        temperature, row_s, kept = np.full(count, 25.0), 10.0, np.ones(count, dtype=bool)
+        even = SimpleNamespace(
+            time=10.0 * np.arange(count),
+            table_rate=np.full(count, 0.3 * moves),
+            angle_deg=angle,
+            drives={"angle": angle} if recorded else {},
+        )
+
+        def __len__(self):
+            return count
+
+        def of(self, values):
+            return values
+
+    rows = Turning()
+    scene = SimpleNamespace(runs=[rows], span_degc=50.0)
+    (family,) = (f for f in unknown_families(STANDARD.grids) if f.id == "table")
+    harmonics = list(family.build(rows, scene, {}))[4].columns
+    assert harmonics[:, 0] == pytest.approx(np.sin(np.radians(angle)))
+    assert harmonics[:, 5] == pytest.approx(np.cos(3.0 * np.radians(angle)))

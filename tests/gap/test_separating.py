@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from fogml.gap.model import EffectValue
 from fogml.gap.planning.programme_design import Design
 from fogml.gap.planning.programme_family import Family
 from fogml.gap.planning.rehearsal import Rehearsal, stage
-from fogml.gap.planning.separating import LEAST_DISTANCE, distances, members_of, separating_run
+from fogml.gap.planning.separating import LEAST_DISTANCE, _gain, distances, members_of, separating_run
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.programme import load_programme
@@ -133,3 +134,11 @@ def test_a_single_effect_is_to_be_shown_and_a_small_one_cannot_be():
 def test_what_cannot_be_separated_is_refused(members, message):
     with pytest.raises(InputError, match=message):
         separating_run(TWIN, NOISE, CONSTANTS, members)
+
+
+@pytest.mark.parametrize(("limits", "gain"), [((0.0, 2.0), 0.0), ((-2.0, 1.0), 4.5)])
+def test_an_amplitude_that_can_only_be_positive_takes_nothing_off_a_negative_response(limits, gain):
+    candidate = SimpleNamespace(amplitude=SimpleNamespace(signed=False, limits=limits))
+    gram = np.array([[2.0]])
+    assert _gain(gram, np.array([-3.0]), candidate) == gain
+    assert _gain(gram, np.array([3.0]), candidate) == 4.5

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from fogml.gap.settings import STANDARD
-from fogml.gap.where import GapOnRun, where
+from fogml.gap.where import GapOnRun, _temperatures, where
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -80,6 +82,17 @@ def test_up_and_down_are_told_apart():
     found = located(np.where(rising, 0.4, -0.4))
     for t in found.temperature:
         assert t.mean_up == pytest.approx(0.4, abs=0.25) and t.mean_down == pytest.approx(-0.4, abs=0.25)
+
+
+def test_three_averages_each_way_tell_a_way_and_two_do_not():
+    rising = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
+    for count, told in ((3, True), (2, False)):
+        way = np.concatenate([rising[:count], rising[-count:]])
+        held = SimpleNamespace(
+            temperature=np.full(len(way), 21.0), gap=0.5 * way, floor=np.full(len(way), 1e-4), rising=way
+        )
+        (only,) = _temperatures([held], STANDARD.reported)
+        assert (only.mean_up, only.mean_down) == ((0.5, -0.5) if told else (None, None))
 
 
 def test_regimes_of_the_gap_are_those_where_it_was():

@@ -81,6 +81,19 @@ def test_tall_ways_agree_and_do_not_depend_on_threads(monkeypatch):
     assert quick.residual_std_ == pytest.approx(safe.residual_std_, rel=1e-12)
 
 
+def test_each_fold_of_tall_rows_is_condensed_by_itself():
+    temperature, y = drift(60_000)
+    columns = powers(temperature, 3)
+    folds = np.arange(len(y)) * 4 // len(y)
+    held = tall_least_squares.condense([Part(y, columns.__getitem__, folds)], 4)
+    rows = np.column_stack((np.ones(len(y)), (columns - held.shift) / held.scale, y - held.y_shift))
+    assert held.counts.tolist() == np.bincount(folds).tolist()
+    for fold in range(4):
+        of_fold = rows[folds == fold]
+        factor = held.factors[fold]
+        np.testing.assert_allclose(factor.T @ factor, of_fold.T @ of_fold, rtol=1e-9, atol=1e-9 * len(y))
+
+
 def test_columns_seen_by_few_rows_are_not_lost():
     """A column that is zero in the sample of rows, and almost everywhere, still gets its coefficient."""
     n = 80_000
