@@ -25,6 +25,7 @@ from fogml.models.mixed_effects_model import averages_of, composed
 from fogml.models.prior import Prior
 from fogml.models.table import run_rows
 from fogml.runs.run import Run
+from fogml.signals.distributions import chi2_ppf
 
 FORM = "T^1..3, dT, T*dT"
 """The form that units are compared in, unless another is stated."""
@@ -264,9 +265,8 @@ def _of_normal(width: int) -> float:
     distribution (consistency at the normal: R. Maronna, Ann. Statist. 4 (1976) 51).
     """
     from scipy.optimize import brentq
-    from scipy.stats import chi2
 
-    squares = chi2.ppf((np.arange(2048) + 0.5) / 2048, width)
+    squares = chi2_ppf((np.arange(2048) + 0.5) / 2048, width)
     return float(
         brentq(lambda c: np.mean((_FREEDOM + width) * squares / (_FREEDOM * c + squares)) - width, 0.05, 1.0)
     )

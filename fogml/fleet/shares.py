@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import t as student
 
 from fogml.arrays import FloatArray
+from fogml.signals.distributions import student_sf
 from fogml.signals.random_effects import random_effects
 
 _STEPS = 4000
@@ -85,7 +85,7 @@ def apart(values: ArrayLike, errors: ArrayLike) -> FloatArray:
         line = random_effects(x[others], se[others])
         spread = np.sqrt(line.between**2 + se[place] ** 2 + line.se**2)
         if spread > 0.0:
-            told[place] = 2.0 * student.sf(abs(x[place] - line.mean) / spread, len(x) - 2)
+            told[place] = 2.0 * student_sf(abs(x[place] - line.mean) / spread, len(x) - 2)
     return told
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
-from scipy.stats import chi2
 
 from fogml.arrays import FloatArray
 from fogml.gap.catalogue import nodes_of, signature_of
@@ -25,6 +24,7 @@ from fogml.gap.scene import Scene
 from fogml.gap.settings import Reported
 from fogml.gap.shapes import AT_AMPLITUDE, GridNode, is_angle
 from fogml.runs.steps import FINEST_STEP_DEGC, WHOLE, recorded_step
+from fogml.signals.distributions import chi2_sf
 from fogml.twin.effect import Effect
 
 
@@ -239,7 +239,7 @@ def agree(by_run: Sequence[RunAmplitude], least: float = Reported.disagree) -> b
         return True
     values, weights = np.array([r.value for r in by_run]), np.array([r.se for r in by_run]) ** -2
     off = values - np.average(values, weights=weights)
-    return bool(chi2.sf(float(weights @ off**2), len(by_run) - 1) > least)
+    return bool(chi2_sf(float(weights @ off**2), len(by_run) - 1) > least)
 
 
 def growth(scene: Scene, by_run: Sequence[RunAmplitude], least: float = Reported.grows) -> float | None:

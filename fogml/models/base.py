@@ -10,8 +10,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator
-from sklearn.exceptions import NotFittedError
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
@@ -20,6 +18,7 @@ from fogml.features.features import Features
 from fogml.models.card import TrainingCard, check_unit_and_axis
 from fogml.models.compact import Compact
 from fogml.models.intervals import Intervals
+from fogml.models.scikit_learn import BaseEstimator, NotFittedError
 from fogml.runs.plausible import refuse_twice
 from fogml.runs.run import Run
 from fogml.signals.averages import block_averages

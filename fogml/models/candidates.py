@@ -15,6 +15,7 @@ from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.feature_model import shared_sensors
 from fogml.runs.run import Run
+from fogml.signals.distributions import chi2_ppf
 
 _AT_LEAST_CUBIC = ("T^1..3", "T^1..5")
 _STATIC = ("", "T", "T^1..2", *_AT_LEAST_CUBIC)
@@ -179,10 +180,8 @@ class Score:
         The mean squares of m rows of white noise scatter by 2 s**4 / m; their sum of squares in these
         units is a chi-square of b - 1 degrees of freedom, exceeded by chance once in a thousand.
         """
-        from scipy.stats import chi2
-
         scatter = np.sum(self.rows * (self.squared_errors / self.mean_square - 1.0) ** 2) / 2.0
-        return bool(scatter < chi2.ppf(0.999, len(self.rows) - 1))
+        return bool(scatter < chi2_ppf(0.999, len(self.rows) - 1))
 
     def beats(self, other: Score, standard_errors: float = STANDARD_ERRORS) -> bool:
         """Whether it is better by more than so many standard errors of the difference, block by block."""

@@ -12,7 +12,6 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from sklearn.base import clone
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
@@ -41,6 +40,7 @@ from fogml.models.regressors import (
     weight_bytes,
 )
 from fogml.models.row_noise import noise_covariance
+from fogml.models.scikit_learn import clone
 from fogml.models.table import RunRows, TrainingTable, row_count, run_rows, table_of_rows
 from fogml.models.tall_least_squares import Part
 from fogml.processes import one_thread

@@ -29,6 +29,7 @@ from fogml.errors import InputError
 from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s
 from fogml.signals.averages import AVERAGING_S
+from fogml.signals.distributions import normal_ppf, student_ppf
 from fogml.strict import Strict, strictly
 
 LEVELS = (*(round(0.05 * i, 2) for i in range(1, 20)), 0.975, 0.99, 0.995)
@@ -144,9 +145,6 @@ def half_widths_of_runs(lefts: Sequence[FloatArray]) -> FloatArray:
     degrees of freedom times the rms of the runs' means, and the normal one, as of many observations, times
     what is left about them, in quadrature.
     """
-    from scipy.stats import norm
-    from scipy.stats import t as student
-
     count, levels = len(lefts), np.array(LEVELS)
     shift = np.sqrt(np.mean([np.mean(left) ** 2 for left in lefts]))
     about = np.sqrt(np.mean([np.var(left) for left in lefts]))
@@ -154,7 +152,7 @@ def half_widths_of_runs(lefts: Sequence[FloatArray]) -> FloatArray:
         [np.abs(left) for left in lefts], np.minimum(levels * (count + 1) / count, 1.0)
     )
     place = 0.5 + levels / 2.0
-    normal = np.hypot(shift * student.ppf(place, count), about * norm.ppf(place))
+    normal = np.hypot(shift * student_ppf(place, count), about * normal_ppf(place))
     half = np.where(levels <= count / (count + 1), conformal, normal)
     # No level is wider than one above it.
     return np.asarray(np.minimum.accumulate(half[::-1])[::-1])

@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils._param_validation import Interval, StrOptions
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
@@ -19,6 +16,14 @@ from fogml.models.arrays import expect_arrays
 from fogml.models.compact import affine
 from fogml.models.folds import dealt_folds
 from fogml.models.parameters import check_parameters
+from fogml.models.scikit_learn import (
+    BaseEstimator,
+    Interval,
+    RegressorMixin,
+    StrOptions,
+    check_is_fitted,
+    validate_data,
+)
 from fogml.models.tall_least_squares import Condensed, Part, condense
 from fogml.strict import Strict, strictly
 

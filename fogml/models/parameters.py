@@ -14,9 +14,9 @@ from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
-from sklearn.utils._param_validation import make_constraint
 
 from fogml.errors import InputError, known_are, quoted
+from fogml.models.scikit_learn import make_constraint
 
 
 class WholeNumbers:

@@ -34,7 +34,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import clone
 
 from fogml.arrays import FloatArray
 from fogml.entry_points import loaded, origin
@@ -42,6 +41,7 @@ from fogml.errors import FogmlError, InputError, first_line, quoted
 from fogml.features.features import Features
 from fogml.models.arrays import expect_arrays
 from fogml.models.folds import FOLDS
+from fogml.models.scikit_learn import clone
 from fogml.models.table import TrainingTable
 
 FORMS = {

@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import Any, ClassVar
 
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -19,6 +18,7 @@ from fogml.features.features import Features
 from fogml.models.card import TrainingCard
 from fogml.models.feature_model import FeatureModel, SavedFeatures
 from fogml.models.parameters import check_parameters
+from fogml.models.scikit_learn import BaseEstimator, RegressorMixin, clone
 from fogml.models.table import TrainingTable
 from fogml.strict import strictly
 

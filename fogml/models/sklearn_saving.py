@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
 
 from fogml.errors import InputError
+from fogml.models.scikit_learn import BaseEstimator, RegressorMixin
 
 
 def numbers_of(regressor: Any) -> int:

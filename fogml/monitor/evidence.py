@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.stats import t as student
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.signals.distributions import student_ppf
 from fogml.signals.noise_model import flicker_ladder
 
 Shape = Literal["step", "ramp"]
@@ -186,4 +186,4 @@ class FigureEvidence:
             return 0.0, np.inf
         size = float(q[:, 1] @ table[:, 2] / r[1, 1])
         left = table[:, 2] - q @ (q.T @ table[:, 2])
-        return size, float(student.ppf(0.95, n - 2) * np.sqrt(left @ left / (n - 2)) / abs(r[1, 1]))
+        return size, float(student_ppf(0.95, n - 2) * np.sqrt(left @ left / (n - 2)) / abs(r[1, 1]))

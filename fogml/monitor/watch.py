@@ -9,12 +9,12 @@ from itertools import groupby
 from typing import Literal
 
 import numpy as np
-from scipy.stats import t as student
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.monitor.changes import ChangePrior, Chart, Shape, change_chart
 from fogml.monitor.record import FIGURES, RunRecord
+from fogml.signals.distributions import student_ppf
 
 DAY_S = 86400.0
 NEAREST: dict[tuple[str, Shape], tuple[str, ...]] = {
@@ -205,7 +205,7 @@ def _calibration(age: FloatArray, level: FloatArray, limit: float) -> Calibratio
     v = float(centred @ centred)
     trend = float(centred @ level) / v
     left = level - level.mean() - trend * centred
-    half = float(student.ppf(0.95, n - 2))
+    half = float(student_ppf(0.95, n - 2))
     deviation = float(np.sqrt(left @ left / (n - 2)))
     slope_half = half * deviation / np.sqrt(v)
 

@@ -12,6 +12,7 @@ from fogml.arrays import FloatArray
 from fogml.intervals import Z90
 from fogml.runs.noise_series import NoiseSeries
 from fogml.runs.run import Run
+from fogml.signals.distributions import chi2_sf
 from fogml.signals.noise_terms import NoiseTerms
 from fogml.signals.stationarity import Stationarity
 
@@ -139,14 +140,12 @@ def doubts_of(
             }
         )
     if alone:
-        from scipy.stats import chi2
-
         told = [term for one in alone if (term := one.terms["N"]).lower > 0.0]
         logarithms = np.array([np.log(term.fitted) for term in told])
         errors = np.array([np.log(term.upper / term.lower) for term in told]) / (2.0 * Z90)
         if len(told) > 1:
             mean = np.average(logarithms, weights=errors**-2)
-            p_value = float(chi2.sf(float(np.sum(((logarithms - mean) / errors) ** 2)), len(told) - 1))
+            p_value = float(chi2_sf(float(np.sum(((logarithms - mean) / errors) ** 2)), len(told) - 1))
             if p_value < DOUBT:
                 span = f"{np.exp(logarithms.min()):.3g} to {np.exp(logarithms.max()):.3g}"
                 warnings.append(

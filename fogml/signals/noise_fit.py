@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.signals.distributions import chi2_ppf, normal_ppf
 from fogml.signals.noise_fit_data import FitData, Level, Part, fit_data
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.noise_terms import FLICKER_FLOOR
@@ -236,12 +237,12 @@ def _moments(
     top says too little. The points are those of a Sobol sequence, always the same, for
     Student's t with five degrees of freedom, wider than the guess.
     """
-    from scipy.stats import chi2, norm, qmc
+    from scipy.stats import qmc
 
     k = len(mean)
     uniform = qmc.Sobol(k + 1, scramble=False).random(2 * _POINTS)[_POINTS:]
-    normal = norm.ppf(uniform[:, :k] + 0.25 / _POINTS)
-    t = normal * np.sqrt(_TAILS / chi2.ppf(uniform[:, k] + 0.25 / _POINTS, _TAILS))[:, None]
+    normal = normal_ppf(uniform[:, :k] + 0.25 / _POINTS)
+    t = normal * np.sqrt(_TAILS / chi2_ppf(uniform[:, k] + 0.25 / _POINTS, _TAILS))[:, None]
     points = mean + _WIDER * t @ np.linalg.cholesky(covariance).T
     proposal = -0.5 * (_TAILS + k) * np.log1p(np.sum(t**2, axis=1) / _TAILS)
     weight = np.array([least - objective(point) for point in points]) - proposal

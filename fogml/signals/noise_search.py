@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.signals.distributions import chi2_sf
 from fogml.signals.noise_spectrum import Spectrum
 from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, OutputFilter
 from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel
@@ -130,11 +131,9 @@ def search_noise(
 
 def fit_p_value(model: SpectrumModel, fit: SpectrumFit) -> float:
     """Chance of errors of the rows as large as a fit's, by chi-square."""
-    from scipy.stats import chi2
-
     errors, rows = _relative_errors(model, fit)
     freedom = len(rows) - fit.free
-    return float(chi2.sf(float(errors @ errors), freedom)) if freedom > 0 else 1.0
+    return float(chi2_sf(float(errors @ errors), freedom)) if freedom > 0 else 1.0
 
 
 def _relative_errors(model: SpectrumModel, fit: SpectrumFit) -> tuple[FloatArray, IndexArray]:

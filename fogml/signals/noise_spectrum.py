@@ -17,6 +17,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.signals import large
 from fogml.signals.cosine import cosine_transform
+from fogml.signals.distributions import chi2_isf, chi2_ppf
 
 Rows = Callable[[slice], FloatArray]
 """Columns of a stretch, told for some of its rows at a time."""
@@ -261,10 +262,8 @@ def _lines(
     square: FloatArray, edges: IntArray, sample_s: float, n: int, offset: int, chance: float
 ) -> tuple[BoolArray | None, list[SpectralLine]]:
     """Coefficients of sinusoids that stand out of their bins' noise, and what they are."""
-    from scipy.stats import chi2
-
     # Median and limit of a squared normal value.
-    typical, limit = float(chi2.ppf(0.5, 1)), float(chi2.isf(chance, 1))
+    typical, limit = float(chi2_ppf(0.5, 1)), float(chi2_isf(chance, 1))
     masked: BoolArray | None = None
     lines: list[SpectralLine] = []
     for low, high in pairwise(edges.tolist()):

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
-from scipy.stats import t as student
+
+from fogml.signals.distributions import student_ppf
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class RandomEffects:
 
     def next_value(self, level: float = 0.9) -> tuple[float, float]:
         """Where the next unit's true value lies with a probability; by Student's t of as many units."""
-        reach = float(student.ppf(0.5 + 0.5 * level, self.count - 1)) * float(np.hypot(self.se, self.between))
+        reach = float(student_ppf(0.5 + 0.5 * level, self.count - 1)) * float(np.hypot(self.se, self.between))
         return self.mean - reach, self.mean + reach
 
 

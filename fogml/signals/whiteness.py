@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
+from fogml.signals.distributions import chi2_cdf, chi2_sf
 
 _FEWEST_BLOCKS = 8
 _FEWEST = 32
@@ -82,8 +83,6 @@ def whiteness(
     InputError
         If there are fewer than 32 innovations, or one is not finite.
     """
-    from scipy.stats import chi2
-
     series = [np.asarray(part, dtype=np.float64) for part in _parts(innovations)]
     count = sum(len(part) for part in series)
     if count < _FEWEST + fitted:
@@ -98,7 +97,7 @@ def whiteness(
     correlation = every / (squares or 1.0)
     portmanteau = count * (count + 2.0) * np.cumsum(correlation**2 / np.maximum(pairs, 1))
     lags = 2 ** np.arange(int(np.log2(longest)) + 1, dtype=np.int64)
-    lag_p = chi2.sf(portmanteau[lags - 1], lags)
+    lag_p = chi2_sf(portmanteau[lags - 1], lags)
 
     scales, ratios, scale_p = [], [], []
     scale = 1
@@ -112,7 +111,7 @@ def whiteness(
         found = sum(float(part @ part) for part in blocks) / scale
         scales.append(scale)
         ratios.append(found / free)
-        scale_p.append(min(1.0, 2.0 * min(chi2.cdf(found, free), chi2.sf(found, free))))
+        scale_p.append(min(1.0, 2.0 * min(chi2_cdf(found, free), chi2_sf(found, free))))
         scale *= 2
 
     p_values = np.concatenate((lag_p, scale_p))

@@ -10,13 +10,13 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from sklearn.base import clone
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.base import GOOD, NOT_FULL, OUTSIDE, DriftModel
 from fogml.models.compensation import compensate_blocks
 from fogml.models.saved import load_model, model_to_saved, save_model
+from fogml.models.scikit_learn import clone
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import Run
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.signals.distributions import chi2_ppf
 from fogml.validation.results import RunJudgement
 
 _COVERAGE = 0.9
@@ -32,10 +33,8 @@ def sample_deviation(values: FloatArray) -> Deviation | None:
 
 
 def _deviation(value: float, n: int) -> Deviation:
-    from scipy.stats import chi2
-
     outside = 0.5 * (1.0 - _COVERAGE)
-    low, high = (value * float(np.sqrt((n - 1) / chi2.ppf(p, n - 1))) for p in (1.0 - outside, outside))
+    low, high = (value * float(np.sqrt((n - 1) / chi2_ppf(p, n - 1))) for p in (1.0 - outside, outside))
     return Deviation(value, (low, high), n)
 
 

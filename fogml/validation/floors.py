@@ -14,6 +14,7 @@ from fogml.runs.noise_series import rows_at_rest
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import thermal_columns
 from fogml.signals import large
+from fogml.signals.distributions import chi2_ppf
 from fogml.signals.floor import Columns, Floor, FloorModel, floor_model
 from fogml.validation.results import RunJudgement
 
@@ -127,9 +128,7 @@ def floor_interval(floor: float, averages: int, level: float = LEVEL) -> tuple[f
     level
         Share of the cases in it.
     """
-    from scipy.stats import chi2
-
-    tails = chi2.ppf([0.5 * (1.0 - level), 0.5 * (1.0 + level)], max(averages, 1))
+    tails = chi2_ppf([0.5 * (1.0 - level), 0.5 * (1.0 + level)], max(averages, 1))
     low, high = floor * np.sqrt(tails / max(averages, 1))
     return float(low), float(high)
 

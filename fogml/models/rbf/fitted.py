@@ -8,15 +8,13 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils._param_validation import Interval
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.models.parameters import check_parameters
 from fogml.models.rbf.network import Network, Solution, solve_network
 from fogml.models.rbf.rates import Edge
+from fogml.models.scikit_learn import BaseEstimator, Interval, RegressorMixin, check_is_fitted, validate_data
 from fogml.strict import Strict, strictly
 
 _ROUNDING_OF_NOISE = 1e-3

@@ -9,8 +9,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
-from sklearn.utils._param_validation import Interval
-from sklearn.utils.validation import validate_data
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
@@ -20,6 +18,7 @@ from fogml.models.rbf.blocks import Frame
 from fogml.models.rbf.centres import orthogonal_least_squares, thinned, thinned_rows
 from fogml.models.rbf.evaluate import basis_functions
 from fogml.models.rbf.fitted import NetworkRegressor, SavedFit
+from fogml.models.scikit_learn import Interval, validate_data
 
 WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Widths tried, in standard deviations of the inputs."""

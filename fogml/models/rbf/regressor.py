@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.utils._param_validation import Interval, StrOptions
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
@@ -19,6 +17,7 @@ from fogml.models.rbf.fitted import NetworkRegressor, SavedFit
 from fogml.models.rbf.rates import RATES_THAT_TELL, Edge, followed_columns, restrained_inputs, training_rates
 from fogml.models.rbf.search import COARSE_ROWS, COARSE_ROWS_PER_CENTRE, Search, SearchSettings
 from fogml.models.rbf.tuning import TuningSettings
+from fogml.models.scikit_learn import Interval, StrOptions, check_is_fitted, validate_data
 
 if TYPE_CHECKING:
     from fogml.features.features import Features

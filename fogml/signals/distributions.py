@@ -1,0 +1,67 @@
+"""Quantiles and tails of chi-square and Student's t, to the bit those of `scipy.stats`.
+
+That package takes longer to load than most commands need for all else; `scipy.special` is loaded by use, too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def chi2_ppf(probability: ArrayLike, freedom: ArrayLike) -> Any:
+    """Value under which a chi-square lies with a probability."""
+    from scipy.special import gammaincinv
+
+    return 2.0 * gammaincinv(np.asarray(freedom) / 2.0, probability)
+
+
+def chi2_isf(probability: ArrayLike, freedom: ArrayLike) -> Any:
+    """Value over which a chi-square lies with a probability."""
+    from scipy.special import chdtri
+
+    return chdtri(freedom, probability)
+
+
+def chi2_cdf(value: ArrayLike, freedom: ArrayLike) -> Any:
+    """Probability of a chi-square under a value, which is not negative."""
+    from scipy.special import chdtr
+
+    return chdtr(freedom, value)
+
+
+def chi2_sf(value: ArrayLike, freedom: ArrayLike) -> Any:
+    """Probability of a chi-square over a value, which is not negative."""
+    from scipy.special import chdtrc
+
+    return chdtrc(freedom, value)
+
+
+def student_ppf(probability: ArrayLike, freedom: ArrayLike) -> Any:
+    """Value under which Student's t lies with a probability between 0 and 1."""
+    from scipy.special import stdtrit
+
+    return stdtrit(freedom, probability)
+
+
+def student_sf(value: ArrayLike, freedom: ArrayLike) -> Any:
+    """Probability of Student's t over a value."""
+    from scipy.special import stdtr
+
+    return stdtr(freedom, -np.asarray(value))
+
+
+def normal_ppf(probability: ArrayLike) -> Any:
+    """Value under which a standard normal one lies with a probability."""
+    from scipy.special import ndtri
+
+    return ndtri(probability)
+
+
+def variances_sf(ratio: float, above: int, below: int) -> float:
+    """Probability of a ratio of two mean squares, of so many degrees of freedom each, over a value (F)."""
+    from scipy.special import fdtrc
+
+    return float(fdtrc(above, below, ratio))

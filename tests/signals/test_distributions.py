@@ -1,0 +1,39 @@
+"""Quantiles and tails are to the bit those of `scipy.stats`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from fogml.signals import distributions as own
+
+RANDOM = np.random.default_rng(0)
+PROBABILITY = np.concatenate([RANDOM.uniform(size=2000), 10.0 ** RANDOM.uniform(-12.0, 0.0, 1000)])
+FREEDOM = np.concatenate([RANDOM.integers(1, 400, 2000), 10.0 ** RANDOM.uniform(-1.0, 5.0, 1000)])
+SQUARES = FREEDOM * RANDOM.lognormal(size=3000)
+VALUES = 5.0 * RANDOM.normal(size=3000)
+
+
+@pytest.mark.parametrize(
+    ("function", "theirs", "at"),
+    [
+        (own.chi2_ppf, stats.chi2.ppf, PROBABILITY),
+        (own.chi2_isf, stats.chi2.isf, PROBABILITY),
+        (own.chi2_sf, stats.chi2.sf, SQUARES),
+        (own.chi2_cdf, stats.chi2.cdf, SQUARES),
+        (own.student_ppf, stats.t.ppf, PROBABILITY),
+        (own.student_sf, stats.t.sf, VALUES),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_values_are_those_of_scipy(function: Callable[..., Any], theirs: Any, at: Any) -> None:
+    np.testing.assert_array_equal(function(at, FREEDOM), theirs(at, FREEDOM))
+
+
+def test_of_a_normal_value_and_of_two_mean_squares() -> None:
+    np.testing.assert_array_equal(own.normal_ppf(PROBABILITY), stats.norm.ppf(PROBABILITY))
+    assert own.variances_sf(2.5, 3, 20) == stats.f.sf(2.5, 3, 20)
