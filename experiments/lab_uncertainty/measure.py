@@ -24,6 +24,11 @@ def of_errors(error: float, se: float | None) -> Told:
     return Told(error, None if se is None else Z90 * se)
 
 
+def of_interval(value: float, truth: float, ends: tuple[float, float] | None) -> Told:
+    """An estimate that is stated with a 90 % interval about it."""
+    return Told(value - truth, None if ends is None else 0.5 * (ends[1] - ends[0]))
+
+
 def wilson(part: int, whole: int, z: float = 1.96) -> tuple[float, float]:
     """95 % interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927)."""
     share = part / whole

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.lab_uncertainty.measure import Told, coverage, of_errors
+from experiments.lab_uncertainty.measure import Told, coverage, of_interval
 from experiments.lab_uncertainty.signals import Noise, kept_rows, lagged, thermometer
 from fogml.arrays import FloatArray
 from fogml.lab.rate_json import rate_json
@@ -75,11 +75,9 @@ CASES = {
 
 @dataclass(frozen=True)
 class Truth:
-    """Scale factor, its line's nonlinearity and asymmetry [ppm], and sensitivity [ppm/degC]."""
+    """Scale factor of the line through the rates, and sensitivity [ppm/degC]."""
 
     scale: float
-    nonlinearity: float
-    asymmetry: float
     sensitivity: float
 
 
@@ -120,35 +118,22 @@ def recorded(ladder: Ladder, rng: np.random.Generator) -> tuple[Run, Truth]:
     levels = np.array(ladder.rates)
     line = np.column_stack([np.ones(len(levels)), levels])
     truth = np.linalg.lstsq(line, output(levels) / 3600.0, rcond=None)[0][1]
-    unique = np.unique(levels)
-    line, bent = np.column_stack([np.ones(len(unique)), unique]), output(unique) / 3600.0
-    left = bent - line @ np.linalg.lstsq(line, bent, rcond=None)[0]
     return Run("ladder", {name: part[kept] for name, part in columns.items()}, Facts()), Truth(
-        float(truth), float(1e6 * np.abs(left).max() / np.abs(bent).max()), float(asymmetry), sensitivity
+        float(truth), sensitivity
     )
 
 
 def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
     """Rows of one case."""
     ladder = CASES[name]
-    told: dict[str, list[Told | None]] = {"scale factor": [], "nonlinearity [ppm]": [], "asymmetry [ppm]": []}
-    if ladder.soaks:
-        told = {"sensitivity [ppm/degC]": []}
+    quantity = "sensitivity [ppm/degC]" if ladder.soaks else "scale factor"
+    told: list[Told | None] = []
     for repeat in range(repeats):
         run, truth = recorded(ladder, np.random.default_rng([seed, repeat]))
-        values = rate_json([run], source="synthetic", settle_s=3.0 * ladder.sample_s + 5.0 * ladder.settle_s)
+        values = rate_json([run], source="synthetic")
         line, sensed = values["scale_factor"], values["temperature_sensitivity"]
-        if ladder.soaks:
-            told["sensitivity [ppm/degC]"].append(
-                None
-                if sensed is None
-                else of_errors(sensed["ppm_per_degC"] - truth.sensitivity, sensed["se"])
-            )
-            continue
-        told["scale factor"].append(of_errors(line["scale_factor"] - truth.scale, line["se"]))
-        for key in ("nonlinearity", "asymmetry"):
-            value = line[f"{key}_ppm"]
-            told[f"{key} [ppm]"].append(
-                None if value is None else of_errors(value - getattr(truth, key), line.get(f"{key}_se_ppm"))
-            )
-    return [coverage(name, quantity, every) for quantity, every in told.items()]
+        if not ladder.soaks:
+            told.append(of_interval(line["scale_factor"], truth.scale, line["ci90"]))
+        elif sensed is not None:
+            told.append(of_interval(sensed["ppm_per_degC"], truth.sensitivity, sensed["ci90"]))
+    return [coverage(name, quantity, told)]

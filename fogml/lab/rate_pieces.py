@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.run import Run
 from fogml.runs.turning import white_noise
 
 LEAST_ROWS = 4
 """Rows that a plateau needs: fewer tell no noise."""
 SETTLING_ROWS = 2
-"""Rows left out at the begin of a plateau unless told otherwise: what a sample's edge and the loop make."""
+"""Rows left out at the begin of a plateau at least, unless told otherwise: a sample's edge and the loop."""
+SETTLED_SHARE = 1e-8
+"""Share of a step of the rate that settling may still lack: a hundredth of a ppm of the scale factor."""
+PARTS = 16
+"""Parts of a plateau that tell how well its mean is known."""
 LEAST_CYCLES = 3
 """Cycles that make an oscillation."""
 SINE_SHARE = 0.95
@@ -23,6 +28,8 @@ ROUND_OFF_DEG_H = 1e-6
 """Rates that differ by less are the same."""
 _BAND = 0.05
 _SAME_CYCLE = 0.2
+_SETTLING_ERRORS = 4.0
+"""Standard errors beyond which the output has not settled: a bias that drifts meanwhile is hardly beyond."""
 _NOISES = 6.0
 """Steps of the recorded rate beyond so many of its own noise are steps of the table."""
 
@@ -88,29 +95,65 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
     waves
         Its oscillations, which hold none.
     settle_s
-        Left out at the begin of each but the first [s]; `SETTLING_ROWS` rows if None.
+        Left out at the begin of each but the first [s]; if None as long as outputs of all plateaus together
+        show that gyro and table have not settled, half of a plateau at most.
     """
     time, rate, output = run.time, run.rate, run.gyro_deg_h
     turning = np.zeros(len(rate), dtype=np.bool_)
     for wave in waves:
         turning[wave.start : wave.stop] = True
     changes = (np.abs(np.diff(rate)) > _NOISES * white_noise(rate[~turning])) | turning[1:] | turning[:-1]
-    edges = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(rate)]])
-    edges = np.union1d(edges, run.gap_starts).astype(np.intp)
+    steps = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(rate)]]).astype(np.intp)
+    settling = _settling_rows(steps, rate, output) if settle_s is None else 0
     rows = []
-    for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        begin = first
-        if first:
-            late = (
-                first + SETTLING_ROWS if settle_s is None else np.searchsorted(time, time[first] + settle_s)
-            )
-            begin = int(late)
-        if last - begin >= LEAST_ROWS and last - first > 2 * LEAST_ROWS:
-            rows.append((begin, last))
+    for start, stop in zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True):
+        settled = start
+        if start and settle_s is not None:
+            settled = int(np.searchsorted(time, time[start] + settle_s))
+        elif start:
+            settled = start + min(settling, max(SETTLING_ROWS, (stop - start) // 2))
+        parts = [start, *_long_gaps(run, start, stop), stop]
+        for first, last in pairwise(parts):
+            begin = max(first, settled)
+            if last - begin >= LEAST_ROWS and last - first > 2 * LEAST_ROWS:
+                rows.append((begin, last))
     told = [_told(run, output, *pair) for pair in rows]
     columns = np.array([(*pair, *values) for pair, values in zip(rows, told, strict=True)]).reshape(-1, 7)
     start, stop = columns[:, :2].astype(np.intp).T
     return Plateaus(start, stop, *columns[:, 2:].T)
+
+
+def _long_gaps(run: Run, start: int, stop: int) -> list[int]:
+    """Rows of a plateau that follow a gap longer than what is recorded of it on either side."""
+    time, inside = run.time, run.gap_starts[(run.gap_starts > start) & (run.gap_starts < stop)]
+    shorter = np.minimum(time[inside - 1] - time[start], time[stop - 1] - time[inside])
+    return [int(row) for row in inside[time[inside] - time[inside - 1] > shorter]]
+
+
+def _settling_rows(steps: IndexArray, rate: FloatArray, output: FloatArray) -> int:
+    """Rows after a step of the rate in which the output lacks some of it, by all steps together.
+
+    In octaves of rows: what the output there differs from the plateau's second half, along the step.
+    """
+    settling = first = SETTLING_ROWS
+    while True:
+        last = 2 * first
+        lacked = squares = noise = 0.0
+        for before, start, stop in zip(steps[:-2].tolist(), steps[1:-1].tolist(), steps[2:].tolist()):
+            half = start + (stop - start) // 2
+            if start - before < LEAST_ROWS or start + first + LEAST_ROWS > half:
+                continue
+            step = 3600.0 * float(rate[start] - rate[start - 1])
+            part, settled = output[start + first : min(start + last, half)], output[half:stop]
+            lacked += step * float(part.mean() - settled.mean())
+            squares += step**2
+            error = _error_of_mean(settled) * np.sqrt((stop - half) / len(part))
+            noise += (step * error) ** 2
+        if not squares > 0.0:
+            return settling
+        if abs(lacked) > max(_SETTLING_ERRORS * np.sqrt(noise), SETTLED_SHARE * squares):
+            settling = last
+        first = last
 
 
 def _told(run: Run, output: FloatArray, start: int, stop: int) -> tuple[float, ...]:
@@ -121,8 +164,13 @@ def _told(run: Run, output: FloatArray, start: int, stop: int) -> tuple[float, .
 
 
 def _error_of_mean(part: FloatArray) -> float:
-    # From differences of neighbours, so that a drift is no noise.
-    return float(np.sqrt(0.5 * np.mean(np.diff(part) ** 2) / len(part)))
+    """Standard error of a mean from differences of neighbouring parts, so that a drift is no noise.
+
+    Of parts and not of rows: rounding to whole counts, which rows hold, averages out sooner than noise.
+    """
+    rows = max(len(part) // PARTS, 1)
+    means = part[len(part) % rows :].reshape(-1, rows).mean(axis=1)
+    return float(np.sqrt(0.5 * np.mean(np.diff(means) ** 2) / len(means)))
 
 
 def merged(values: FloatArray, error: FloatArray) -> FloatArray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.lab.rate_errors import spread_of
 from fogml.lab.rate_pieces import Plateaus
 from fogml.runs.run import Run
 from fogml.validation.scale_factor import find_steps
@@ -40,8 +41,10 @@ class Sensitivity:
 
     Attributes
     ----------
-    ppm_per_degC, se
-        eps_T, the slope at the mean of the temperatures, and its standard error; None for two temperatures.
+    ppm_per_degC, se, ci90
+        eps_T, the slope at the mean of the temperatures, its standard error, and the interval that holds it
+        with 90 %, by what steps in a soak differ and by what soaks miss the curve; None where nothing is left
+        over.
     curvature_ppm_per_degC2
         Of a parabola; None for fewer than `LEAST_FOR_CURVE` temperatures.
     temperature, scale_factor
@@ -52,6 +55,7 @@ class Sensitivity:
 
     ppm_per_degC: float
     se: float | None
+    ci90: tuple[float, float] | None
     curvature_ppm_per_degC2: float | None
     temperature: FloatArray
     scale_factor: FloatArray
@@ -81,18 +85,21 @@ def temperature_sensitivity(runs: Sequence[Run], least_deg_h: float, most_deg_h:
     steps = np.concatenate([np.empty((0, 4)), *parts.values()])
     if not _apart(steps):
         return None
-    x, y = _soaks(steps)
+    soaks = _soaks(steps)
+    x, y = soaks.temperature, soaks.scale
     columns = 3 if len(x) >= LEAST_FOR_CURVE else 2
     off = x - x.mean()
     matrix = np.column_stack([np.ones(len(x)), off, off**2 - np.mean(off**2)])[:, :columns]
-    solved = np.linalg.lstsq(matrix, y, rcond=None)[0]
-    se = None
-    if len(x) > columns:
-        left = y - matrix @ solved
-        deviation = float(np.sqrt(left @ left / (len(x) - columns)))
-        se = float(1e6 * deviation * np.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1]) / solved[0])
+    inverse = np.linalg.pinv(matrix)
+    solved = inverse @ y
+    both = (soaks.variance, np.full(len(x), soaks.variance.mean()))
+    found = spread_of(inverse[1], matrix, y, both, squares=soaks.squares, freedom=soaks.freedom)
+    slope, se, ends = 1e6 * float(solved[1] / solved[0]), None, None
+    if found is not None:
+        se, half = (1e6 * part / abs(float(solved[0])) for part in (found.se, found.half_width))
+        ends = (slope - half, slope + half)
     curve = 1e6 * float(solved[2] / solved[0]) if columns == 3 else None
-    return Sensitivity(1e6 * float(solved[1] / solved[0]), se, curve, x, y, tuple(parts))
+    return Sensitivity(slope, se, ends, curve, x, y, tuple(parts))
 
 
 def _apart(steps: FloatArray) -> bool:
@@ -113,10 +120,30 @@ def _steps(run: Run, least: float, most: float) -> FloatArray:
     return np.column_stack([temperature, steps.height, sizes, steps.of(run.gyro_deg_h)])[told]
 
 
-def _soaks(steps: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean temperature and scale factor of the steps of each temperature, shape (s,)."""
+@dataclass(frozen=True, eq=False)
+class _Soaks:
+    """Temperature [degC], scale factor, and its variance in that of a step [1/(deg/h)^2], shape (s,).
+
+    ``squares`` [(deg/h)^2] and ``freedom`` are what steps differ by within soaks.
+    """
+
+    temperature: FloatArray
+    scale: FloatArray
+    variance: FloatArray
+    squares: float
+    freedom: int
+
+
+def _soaks(steps: FloatArray) -> _Soaks:
+    """Scale factor of the steps of each temperature."""
     steps = steps[np.argsort(steps[:, 0])]
     edges = np.flatnonzero(np.diff(steps[:, 0]) > SAME_DEGC) + 1
-    groups = np.split(steps, edges)
-    scale = [float(np.linalg.lstsq(group[:, 1:3], group[:, 3], rcond=None)[0][0]) for group in groups]
-    return np.array([float(group[:, 0].mean()) for group in groups]), np.array(scale)
+    told, squares, freedom = [], 0.0, 0
+    for group in np.split(steps, edges):
+        inverse = np.linalg.pinv(group[:, 1:3])
+        solved = inverse @ group[:, 3]
+        left = group[:, 3] - group[:, 1:3] @ solved
+        squares += float(left @ left)
+        freedom += len(group) - int(np.linalg.matrix_rank(group[:, 1:3]))
+        told.append((float(group[:, 0].mean()), float(solved[0]), float(inverse[0] @ inverse[0])))
+    return _Soaks(*np.array(told).T, squares, freedom)

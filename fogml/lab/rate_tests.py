@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.arrays import IndexArray
+from fogml.arrays import FloatArray, IndexArray
+from fogml.lab.rate_errors import spread_of
 from fogml.lab.rate_pieces import ROUND_OFF_DEG_H, Plateaus, merged
 from fogml.validation.rate_ladder import LEAST_LEVELS, nonlinearity_ppm
 
@@ -55,8 +56,10 @@ class Line:
 
     Attributes
     ----------
-    scale_factor, se
-        Output over input.
+    scale_factor, se, ci90
+        Output over input, its standard error, and the interval that holds it with 90 %. The rates' scatter
+        about the line counts as noise of two parts, one that goes with the rate, such as the table's; so does
+        nonlinearity, which one way through the rates does not tell from it. None where nothing is left over.
     nonlinearity_ppm
         Greatest deviation of a rate's output from the line over the greatest output; None for fewer than
         four rates.
@@ -65,7 +68,8 @@ class Line:
     """
 
     scale_factor: float
-    se: float
+    se: float | None
+    ci90: tuple[float, float] | None
     nonlinearity_ppm: float | None
     asymmetry_ppm: float | None
 
@@ -141,18 +145,20 @@ def _levels(plateaus: Plateaus) -> IndexArray:
     return np.unique(merged(plateaus.rate, plateaus.rate_error), return_inverse=True)[1]
 
 
-def _drift(plateaus: Plateaus, level: IndexArray) -> float | None:
-    """Steady drift of the bias by rates that come again [deg/h per s]; None where none does."""
+def _drift_gain(plateaus: Plateaus, level: IndexArray) -> FloatArray | None:
+    """What outputs are multiplied with for a steady drift of the bias [1/s], by rates that come again.
+
+    None where none does.
+    """
     count = np.bincount(level)
-    time, output = (
-        values - (np.bincount(level, values) / count)[level] for values in (plateaus.time, plateaus.output)
-    )
-    return float(time @ output / (time @ time)) if (count > 1).any() else None
+    time = plateaus.time - (np.bincount(level, plateaus.time) / count)[level]
+    return time / (time @ time) if (count > 1).any() else None
 
 
 def _fit(plateaus: Plateaus) -> tuple[float, float, float]:
     """Scale factor, bias [deg/h] at time 0 and its drift [deg/h per s]."""
-    drift = _drift(plateaus, _levels(plateaus)) or 0.0
+    by_time = _drift_gain(plateaus, _levels(plateaus))
+    drift = 0.0 if by_time is None else float(by_time @ plateaus.output)
     line = np.column_stack([plateaus.rate, np.ones(len(plateaus))])
     scale, bias = np.linalg.lstsq(line, plateaus.output - drift * plateaus.time, rcond=None)[0].tolist()
     return scale, bias, drift
@@ -161,16 +167,16 @@ def _fit(plateaus: Plateaus) -> tuple[float, float, float]:
 def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
     scale, bias, drift = _fit(plateaus)
     above = plateaus.output - drift * plateaus.time - bias
-    left = above - scale * plateaus.rate
     level = _levels(plateaus)
     count = np.bincount(level)
-    matrix = np.column_stack([plateaus.rate, np.ones(len(plateaus))])
-    if len(plateaus) > 4 and (count > 1).any():
-        matrix = np.column_stack([matrix, plateaus.time - plateaus.time.mean()])
-    freedom = max(len(plateaus) - matrix.shape[1], 1)
+    line = np.column_stack([plateaus.rate, np.ones(len(plateaus))])
+    gain, matrix = np.linalg.pinv(line)[0], line
+    if (by_time := _drift_gain(plateaus, level)) is not None:
+        gain = gain - float(gain @ plateaus.time) * by_time
+        matrix = np.column_stack([line, plateaus.time - plateaus.time.mean()])
+    scatter = (np.ones(len(plateaus)), (plateaus.rate / np.abs(plateaus.rate).max()) ** 2)
     # What the plateaus' own noise makes, or what they scatter by, whichever is more.
-    deviation = max(float(np.sqrt(left @ left / freedom)), float(np.sqrt(np.mean(plateaus.error**2))))
-    inverse = np.linalg.pinv(matrix.T @ matrix)
+    found = spread_of(gain, matrix, plateaus.output, scatter, least=float(np.mean(plateaus.error**2)))
     greatest = float(np.abs(plateaus.rate).max())
     asymmetry, least = None, criteria.small * greatest
     senses = [plateaus.rate > least, plateaus.rate < -least]
@@ -179,7 +185,8 @@ def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
         both = np.column_stack([plateaus.rate, np.ones(len(plateaus)), np.abs(plateaus.rate)])
         asymmetry = 2e6 * float(np.linalg.lstsq(both, above, rcond=None)[0][-1]) / scale
     means = [np.bincount(level, values) / count for values in (plateaus.rate, above)]
-    return Line(scale, deviation * float(np.sqrt(inverse[0, 0])), nonlinearity_ppm(*means), asymmetry)
+    ends = None if found is None else (scale - found.half_width, scale + found.half_width)
+    return Line(scale, None if found is None else found.se, ends, nonlinearity_ppm(*means), asymmetry)
 
 
 def near_zero(plateaus: Plateaus, greatest: float, criteria: Criteria) -> Plateaus:

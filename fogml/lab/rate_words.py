@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 Number = Callable[[float | None], str]
@@ -24,6 +24,7 @@ def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     line = values["scale_factor"]
     if line is not None:
         ppm = f"{1e6 * (line['scale_factor'] - 1.0):+.1f} ppm".replace("-", "\N{MINUS SIGN}")
+        ppm += _within(line["ci90"], 1e6, "ppm", number)
         rows.append(ResultRow("scale factor", f"{line['scale_factor']:.7f}", number(line["se"]), "1", ppm))
         for key, name in (("nonlinearity_ppm", "nonlinearity"), ("asymmetry_ppm", "asymmetry")):
             if line[key] is not None:
@@ -47,6 +48,7 @@ def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     if sensed is not None:
         slope = number(sensed["ppm_per_degC"])
         remark = f"over {len(sensed['temperature'])} temperatures"
+        remark += _within(sensed["ci90"], 1.0, "ppm/degC", number)
         rows.append(ResultRow("temperature sensitivity", slope, number(sensed["se"]), "ppm/degC", remark))
         if sensed["curvature_ppm_per_degC2"] is not None:
             curve = number(sensed["curvature_ppm_per_degC2"])
@@ -54,6 +56,13 @@ def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     if values["count_arcsec"] is not None:
         rows.append(ResultRow("one count", number(values["count_arcsec"]), "", "arcsec", "of angle"))
     return rows
+
+
+def _within(ends: Sequence[float] | None, scale: float, unit: str, number: Number) -> str:
+    """``, 90 %: ± 0.3 ppm``."""
+    if ends is None:
+        return ""
+    return f", 90 %: ± {number(0.5 * scale * (ends[1] - ends[0]))} {unit}"
 
 
 def _response(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
