@@ -146,4 +146,5 @@ def _soaks(steps: FloatArray) -> _Soaks:
         squares += float(left @ left)
         freedom += len(group) - int(np.linalg.matrix_rank(group[:, 1:3]))
         told.append((float(group[:, 0].mean()), float(solved[0]), float(inverse[0] @ inverse[0])))
-    return _Soaks(*np.array(told).T, squares, freedom)
+    temperature, scale, variance = np.array(told).T
+    return _Soaks(temperature, scale, variance, squares, freedom)
