@@ -221,31 +221,18 @@ def shade(figure: go.Figure, segments: Sequence[Segment]) -> list[str]:
     if len(seen) > _MOST_BANDS:
         widest = sorted(seen, key=lambda s: s[1] - s[2])[:_MOST_BANDS]
         seen = sorted(widest, key=lambda s: s[1])
+    shapes: list[Any] = [*figure.layout.shapes]
+    words: list[Any] = [*figure.layout.annotations]
     for name, start, stop in seen:
+        band = {"type": "rect", "layer": "below", "line": {"width": 0}, "xref": "x", "yref": "paper"}
         tint = REGIME_TINTS.get(name, "rgba(0, 0, 0, 0.08)")
-        figure.add_shape(
-            type="rect",
-            layer="below",
-            line_width=0,
-            fillcolor=tint,
-            xref="x",
-            yref="paper",
-            x0=start,
-            x1=stop,
-            y0=0,
-            y1=1,
-        )
+        shapes.append({**band, "fillcolor": tint, "x0": start, "x1": stop, "y0": 0, "y1": 1})
         if stop - start >= _LEAST_SHARE_NAMED * whole:
-            figure.add_annotation(
-                text=regime_word(name),
-                showarrow=False,
-                xref="x",
-                yref="paper",
-                x=0.5 * (start + stop),
-                y=1.0,
-                yanchor="bottom",
-                font={"size": 11, "color": "#57606A"},
-            )
+            place = {"xref": "x", "yref": "paper", "x": 0.5 * (start + stop), "y": 1.0, "yanchor": "bottom"}
+            font = {"size": 11, "color": "#57606A"}
+            words.append({"text": regime_word(name), "showarrow": False, "font": font, **place})
+    # All at once: plotly checks all that is there again with each one added.
+    figure.update_layout(shapes=shapes, annotations=words)
     return in_order(name for name, _, _ in seen)
 
 
