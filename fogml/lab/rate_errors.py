@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import t as student
 
 from fogml.arrays import FloatArray
+from fogml.signals.distributions import students_ppf
 
 LEVEL = 0.9
 _RATIOS = np.concatenate(([0.0], 2.0 ** np.arange(-2.0, 13.0)))
@@ -73,8 +72,6 @@ def spread_of(
     if not se > 0.0:
         return Spread(0.0, 0.0)
 
-    def beyond(half: float) -> float:
-        return float(weights @ student.cdf(half / np.maximum(sizes, 1e-300), free)) - 0.5 * (1.0 + LEVEL)
-
-    most = float(sizes.max()) * float(student.ppf(0.5 * (1.0 + LEVEL), free))
-    return Spread(se, float(brentq(beyond, 0.0, 1.01 * most)))
+    # Of a ratio without scatter nothing is off: a scale of 0 has no quantile.
+    scales = np.maximum(sizes, 1e-12 * se)
+    return Spread(se, students_ppf(0.5 * (1.0 + LEVEL), weights, np.zeros(len(sizes)), scales, free))

@@ -50,8 +50,8 @@ class Change:
     shape
         ``step``, or ``ramp`` over the unit's age.
     size, size_ci90
-        How far a step goes in the figure's unit, or what a ramp adds per unit of age, by least squares with
-        the interval of Student's t.
+        How far a step goes in the figure's unit, or what a ramp adds per unit of age: median and interval of
+        Student's t by least squares for each run that it may have begun with, in proportion to probabilities.
     statistic
         Sum of the evidences, against the limit.
     probability
@@ -169,15 +169,15 @@ def _change(
     best = int(np.argmax(shares))
     likely = np.argsort(-shares)
     held = likely[: int(np.searchsorted(np.cumsum(shares[likely]), 0.9)) + 1]
-    size, half = chart.size(best, s)
+    median, *ends = (chart.size_quantile(level, s, shares) for level in (0.5, 0.05, 0.95))
     return Change(
         raised_at=place,
         onset=chart.onset(best),
         onset_ci90=(chart.onset(int(held.min())), chart.onset(int(held.max()))),
         figure=name,
         shape=SHAPES[s],
-        size=size,
-        size_ci90=(size - half, size + half),
+        size=median,
+        size_ci90=(ends[0], ends[1]),
         statistic=float(statistic),
         probability=float(np.exp(mass[name, s] - np.logaddexp.reduce(list(mass.values())))),
     )

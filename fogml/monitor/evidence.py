@@ -9,10 +9,12 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from fogml.arrays import FloatArray, IndexArray
-from fogml.signals.distributions import student_ppf
+from fogml.signals.distributions import students_ppf
 from fogml.signals.noise_model import flicker_ladder
 
 Shape = Literal["step", "ramp"]
+_UNLIKELY = 1e-4
+"""Probability of an onset below which it adds nothing to the interval of a change's size."""
 SHAPES: tuple[Shape, ...] = ("step", "ramp")
 
 
@@ -171,8 +173,20 @@ class FigureEvidence:
         """Index of the run that a change begins with."""
         return int(self._rows[self._baseline + change])
 
-    def size(self, change: int, shape: int) -> tuple[float, float]:
-        """A change's size by generalised least squares, and the half-width of its 90 % interval."""
+    def size_quantile(self, level: float, shape: int, shares: FloatArray) -> float:
+        """Quantile of a change's size, whose onset has the probabilities `shares`, shape (m,)."""
+        told = {int(change): self._size(int(change), shape) for change in np.flatnonzero(shares > _UNLIKELY)}
+        told = {change: size for change, size in told.items() if size is not None}
+        if not told:
+            return 0.0 if level == 0.5 else float(np.copysign(np.inf, level - 0.5))
+        weights, (centres, scales) = shares[list(told)], np.array(list(told.values())).T
+        return students_ppf(level, weights / weights.sum(), centres, scales, self._done - 2)
+
+    def _size(self, change: int, shape: int) -> tuple[float, float] | None:
+        """A change's size by generalised least squares from a given run on, and its standard error.
+
+        None where it is not told from the mean.
+        """
         n = self._done
         age = self._age[:n]
         t = self._t[:n]
@@ -183,7 +197,8 @@ class FigureEvidence:
         table = np.linalg.solve(root, np.stack((np.ones(n), column, self._y[:n]), axis=1))
         q, r = np.linalg.qr(table[:, :2])
         if abs(r[1, 1]) <= 1e-9 * abs(r[0, 0]) * np.abs(column).max():
-            return 0.0, np.inf
+            return None
         size = float(q[:, 1] @ table[:, 2] / r[1, 1])
         left = table[:, 2] - q @ (q.T @ table[:, 2])
-        return size, float(student_ppf(0.95, n - 2) * np.sqrt(left @ left / (n - 2)) / abs(r[1, 1]))
+        error = float(np.sqrt(left @ left / (n - 2)) / abs(r[1, 1]))
+        return size, max(error, np.spacing(abs(size)))

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fogml.arrays import FloatArray
+
 
 def chi2_ppf(probability: ArrayLike, freedom: ArrayLike) -> Any:
     """Value under which a chi-square lies with a probability."""
@@ -51,6 +53,24 @@ def student_sf(value: ArrayLike, freedom: ArrayLike) -> Any:
     from scipy.special import stdtr
 
     return stdtr(freedom, -np.asarray(value))
+
+
+def students_ppf(
+    probability: float, weights: FloatArray, centres: FloatArray, scales: FloatArray, freedom: float
+) -> float:
+    """Value under which a mixture of Student's t about `centres` lies with a probability, by halving.
+
+    Weights, centres and scales, none of which is 0, are of shape (m,).
+    """
+    ends = centres + scales * student_ppf(probability, freedom)
+    low, high = float(ends.min()), float(ends.max())
+    while high - low > 1e-12 * max(abs(low), abs(high)):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        above = float(weights @ student_sf((middle - centres) / scales, freedom))
+        low, high = (low, middle) if above < 1.0 - probability else (middle, high)
+    return 0.5 * (low + high)
 
 
 def normal_ppf(probability: ArrayLike) -> Any:

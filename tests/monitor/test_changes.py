@@ -159,9 +159,20 @@ def test_what_is_wrong_is_said():
 
 
 def test_an_onset_is_one_of_the_fewest_that_hold_nine_tenths():
-    chart = SimpleNamespace(onset=lambda place: place, size=lambda place, shape: (1.0, 0.1))
+    chart = SimpleNamespace(onset=lambda place: place, size_quantile=lambda level, shape, shares: level)
     shares = np.array([0.05, 0.5, 0.41, 0.03, 0.01])
     logs = {"bias": np.log(np.column_stack([shares, 1e-3 * shares]))}
     found = _change({"bias": chart}, logs, 9, 2000.0)
     assert (found.shape, found.onset, found.onset_ci90) == ("step", 1, (1, 2))
     assert found.probability == pytest.approx(1.0 / 1.001)
+
+
+def test_the_size_of_a_ramp_counts_that_its_onset_is_not_known() -> None:
+    held, runs = [], np.arange(40.0)
+    for seed in range(40):
+        level = np.random.default_rng(seed).standard_normal(40) + 0.7 * np.maximum(runs - 19.0, 0.0)
+        changes = change_chart({"level": level}, runs, 300.0).changes
+        if changes and changes[0].shape == "ramp":
+            held.append(changes[0].size_ci90[0] <= 0.7 <= changes[0].size_ci90[1])
+    # From the likeliest run alone, intervals held half of the true sizes.
+    assert len(held) >= 30 and np.mean(held) > 0.8

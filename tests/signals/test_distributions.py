@@ -37,3 +37,17 @@ def test_values_are_those_of_scipy(function: Callable[..., Any], theirs: Any, at
 def test_of_a_normal_value_and_of_two_mean_squares() -> None:
     np.testing.assert_array_equal(own.normal_ppf(PROBABILITY), stats.norm.ppf(PROBABILITY))
     assert own.variances_sf(2.5, 3, 20) == stats.f.sf(2.5, 3, 20)
+
+
+def test_a_mixture_of_students() -> None:
+    centres, scales, weights = (
+        np.array([-1.0, 0.5, 3.0]),
+        np.array([0.5, 1.0, 2.0]),
+        np.array([0.2, 0.5, 0.3]),
+    )
+    for probability in (0.05, 0.5, 0.95):
+        value = own.students_ppf(probability, weights, centres, scales, 7.0)
+        assert weights @ stats.t.cdf((value - centres) / scales, 7.0) == pytest.approx(probability, abs=1e-9)
+    assert own.students_ppf(0.95, np.ones(1), np.zeros(1), np.ones(1), 7.0) == pytest.approx(
+        stats.t.ppf(0.95, 7)
+    )

@@ -1,0 +1,88 @@
+"""Units in service: figures of a run, false alarms, and sizes of changes against true ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.lab_uncertainty.measure import Told, coverage, of_interval, share
+from experiments.lab_uncertainty.signals import flicker
+from fogml.arrays import FloatArray
+from fogml.monitor.changes import change_chart
+
+LIMIT, RUNS = 300.0, 40
+
+
+@dataclass(frozen=True)
+class Months:
+    """Runs of a unit: what moves its figure between them, and what changes with run `onset`.
+
+    Deviations between runs: white, flicker, a walk, and the tails of a Student's t with `freedom`, 0 for
+    normal ones; each run tells its figure with an error of the deviation `error`, stated right. The change is
+    a step or, per run, a ramp, of the given size either way.
+    """
+
+    white: float = 1.0
+    flicker: float = 0.0
+    walk: float = 0.0
+    freedom: int = 0
+    error: float = 0.5
+    shape: str = ""
+    size: float = 0.0
+    onset: int = 20
+
+
+CASES = {
+    "nothing changes, white": Months(),
+    "nothing changes, flicker": Months(flicker=1.0),
+    "nothing changes, tails": Months(freedom=3),
+    "nothing changes, random walk": Months(walk=0.1),
+    "step of 6": Months(shape="step", size=6.0),
+    "step of 12": Months(shape="step", size=12.0),
+    "step of 12 on flicker": Months(flicker=1.0, shape="step", size=12.0),
+    "ramp of 0.5 a run": Months(shape="ramp", size=0.5),
+    "ramp of 1 a run": Months(shape="ramp", size=1.0),
+    "ramp of 1 a run on flicker": Months(flicker=1.0, shape="ramp", size=1.0),
+}
+
+
+def recorded(months: Months, rng: np.random.Generator) -> tuple[FloatArray, FloatArray, float]:
+    """Levels and their standard errors, and the true size of the change."""
+    white = rng.standard_t(months.freedom, RUNS) if months.freedom else rng.standard_normal(RUNS)
+    level = months.white * white + months.walk * np.cumsum(rng.standard_normal(RUNS))
+    level += months.flicker * flicker(rng, RUNS)
+    errors = months.error * np.exp(0.3 * rng.standard_normal(RUNS))
+    level += errors * rng.standard_normal(RUNS) + rng.normal(0.0, 10.0)
+    size = months.size * rng.choice([-1.0, 1.0])
+    after = np.maximum(np.arange(RUNS) - (months.onset - 1.0), 0.0)
+    level += size * (after if months.shape == "ramp" else np.minimum(after, 1.0))
+    return level, errors, size
+
+
+def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
+    """Rows of one case."""
+    months, false, onset = CASES[name], 0, []
+    sizes: list[Told | None] = []
+    for repeat in range(repeats):
+        level, errors, size = recorded(months, np.random.default_rng([seed, repeat]))
+        age = np.arange(float(RUNS))
+        chart = change_chart({"level": level}, age, LIMIT, errors={"level": errors})
+        if not months.shape:
+            false += bool(chart.changes)
+            continue
+        false += any(change.raised_at < months.onset for change in chart.changes)
+        real = [change for change in chart.changes if change.raised_at >= months.onset]
+        if real and real[0].shape == months.shape:
+            sizes.append(of_interval(real[0].size, size, real[0].size_ci90))
+            low, high = real[0].onset_ci90
+            onset.append(low <= months.onset <= high)
+    before = RUNS if not months.shape else months.onset
+    rows = [share(name, f"a false alarm in {before} runs", false, repeats, before / LIMIT)]
+    if onset:
+        rows.append(coverage(name, "size of the change", sizes))
+        rows.append(
+            share(name, "run of onset not among those of 90 %", len(onset) - sum(onset), len(onset), 0.1)
+        )
+    return rows
