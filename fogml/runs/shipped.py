@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fogml.errors import InputError, did_you_mean
+from fogml.runs.arrow_values import float_values
 from fogml.runs.findings import Finding
 from fogml.runs.logger_text import LoggerTable
 from fogml.runs.profile_schema import ImportProfile, load_profile
@@ -74,13 +75,12 @@ def _runs(recording: str) -> dict[str, Run]:
 
 
 def _stored_table(path: Path, profile: ImportProfile) -> LoggerTable:
-    import pyarrow.parquet as parquet
+    from pyarrow.parquet import ParquetFile
 
-    stored = parquet.read_table(path)
+    with ParquetFile(path) as file:
+        stored = file.read()
     stated = json.loads(stored.schema.metadata[METADATA_KEY])
-    columns = {
-        source: stored[str(source)].to_numpy().astype(np.float64, copy=False) for source in profile.sources
-    }
-    rows = stored[ROW_COLUMN].to_numpy().astype(np.intp, copy=False)
+    columns = {source: float_values(stored[str(source)]) for source in profile.sources}
+    rows = float_values(stored[ROW_COLUMN]).astype(np.intp)
     findings = tuple(Finding(**finding) for finding in stated["findings"])
     return LoggerTable(columns, rows, stated["total_rows"], findings)

@@ -1,0 +1,41 @@
+"""Values of Arrow's columns are those of its own conversion, without pandas."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as arrow
+import pytest
+
+from fogml.runs.arrow_values import float_values
+from tests.cli.conftest import csv_text
+
+
+@pytest.mark.parametrize("kind", ["float64", "float32", "int64", "int32"])
+@pytest.mark.parametrize("present", [1.0, 0.7])
+def test_values_are_those_of_arrows_own_conversion(kind: str, present: float) -> None:
+    random = np.random.default_rng(3)
+    numbers = [int(x) if random.uniform() < present else None for x in random.integers(-(10**6), 10**6, 57)]
+    whole = arrow.chunked_array([arrow.array(part, kind) for part in (numbers[:20], [], numbers[20:])])
+    for column in (
+        whole,
+        whole.slice(3, 30),
+        whole.slice(21, 11),
+        whole.slice(0, 0),
+        arrow.chunked_array([], kind),
+    ):
+        np.testing.assert_array_equal(float_values(column), column.to_numpy().astype(np.float64))
+
+
+def test_a_run_is_read_and_a_shipped_one_without_pandas(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(csv_text(0, rows=100))
+    code = (
+        "import sys; from fogml.runs.reading import read_run; from fogml.runs.shipped import shipped_run\n"
+        "print(len(read_run('a.csv')), len(shipped_run('thermal-cycle-1-x')) > 0, 'pandas' in sys.modules)"
+    )
+    command = [sys.executable, "-c", code]
+    found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert found.stdout == "100 True False\n"
