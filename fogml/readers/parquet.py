@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrow_arrays import values_of
 from fogml.readers.stored import Refused, text_of
 
 _BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
@@ -99,12 +100,12 @@ class ParquetColumn:
         """The rows from `start` to `stop` as numbers, piece by piece."""
         for piece in self.parts(start, stop):
             if self.is_stamp:
-                since = nanoseconds(piece).fill_null(self.first_ns).to_numpy(zero_copy_only=False)
-                held = np.where(piece.is_null().to_numpy(zero_copy_only=False), np.nan, since - self.first_ns)
+                since = values_of(nanoseconds(piece).fill_null(self.first_ns))
+                held = np.where(values_of(piece.is_null()), np.nan, since - self.first_ns)
                 yield held / 1e9
             else:
                 # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
-                yield piece.cast("float64", safe=False).to_numpy(zero_copy_only=False)
+                yield values_of(piece.cast("float64", safe=False))
 
     def marks(self, most: int) -> tuple[list[str], np.ndarray[Any, Any]]:
         """The different texts of a column, at most so many, and the place of each row's among them."""

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fogml.arrow_arrays import values_of
 from fogml.errors import InputError
-from fogml.runs.arrow_values import float_values
 from fogml.runs.csv_dialect import CsvDialect, csv_dialect
 from fogml.runs.csv_end import cut_error, cut_line, note_of_end, without_footer
 from fogml.runs.csv_lines import LineReader, line_of_row
@@ -169,7 +169,7 @@ def _options(dialect: CsvDialect, skipped: int) -> dict[str, Any]:
 
 
 def _raw(path: Path, dialect: CsvDialect, table: Table, start: int, clock: StampClock | None) -> RawTable:
-    columns = {dialect.cells[i]: float_values(table.column(str(i))) for i in dialect.read}
+    columns = {dialect.cells[i]: values_of(table.column(str(i))) for i in dialect.read}
     if clock is not None:
         texts = [table.column(str(i)).combine_chunks() for i in dialect.stamp_places]
         columns[dialect.time_cell] = clock.seconds(texts)

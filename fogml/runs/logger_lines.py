@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.arrow_arrays import values_of
 from fogml.errors import InputError
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.raw_table import empty_file
@@ -210,7 +211,7 @@ def field_numbers(content: bytes, profile: TextLayout, fields: int, positions: l
         text = _fields(content, profile, fields, positions, pa.string(), [""])
         numbers = [_numbers(text[name], profile.decimal) for name in text.column_names]
         columns = pa.table(numbers, names=text.column_names)
-    return np.stack([columns[name].to_numpy() for name in wanted])
+    return np.stack([values_of(columns[name]) for name in wanted])
 
 
 def _numbers(text: Any, decimal: str) -> Any:

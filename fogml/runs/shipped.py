@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fogml.arrow_arrays import values_of
 from fogml.errors import InputError, did_you_mean
-from fogml.runs.arrow_values import float_values
 from fogml.runs.findings import Finding
 from fogml.runs.logger_text import LoggerTable
 from fogml.runs.profile_schema import ImportProfile, load_profile
@@ -80,7 +80,7 @@ def _stored_table(path: Path, profile: ImportProfile) -> LoggerTable:
     with ParquetFile(path) as file:
         stored = file.read()
     stated = json.loads(stored.schema.metadata[METADATA_KEY])
-    columns = {source: float_values(stored[str(source)]) for source in profile.sources}
-    rows = float_values(stored[ROW_COLUMN]).astype(np.intp)
+    columns = {source: values_of(stored[str(source)]).astype(np.float64) for source in profile.sources}
+    rows = values_of(stored[ROW_COLUMN]).astype(np.intp)
     findings = tuple(Finding(**finding) for finding in stated["findings"])
     return LoggerTable(columns, rows, stated["total_rows"], findings)

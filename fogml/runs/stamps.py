@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IntArray
+from fogml.arrow_arrays import values_of
 from fogml.errors import InputError
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class StampForm:
         import pyarrow.compute as compute
 
         found = compute.extract_regex(texts, _FORMS[self.kind])
-        wrong = np.asarray(found.is_null().to_numpy(zero_copy_only=False), dtype=np.bool_)
+        wrong = values_of(found.is_null())
         parts = {field.name: found.field(field.name) for field in found.type}
         total = np.zeros(len(texts), dtype=np.int64)
         if "a" in parts:
@@ -211,7 +212,7 @@ def _whole(texts: Any) -> IntArray:
     import pyarrow.compute as compute
 
     digits = compute.if_else(compute.equal(texts, ""), None, texts)
-    return np.asarray(compute.fill_null(digits.cast(arrow.int64()), 0).to_numpy(zero_copy_only=False))
+    return values_of(compute.fill_null(digits.cast(arrow.int64()), 0))
 
 
 def _month(texts: Any) -> IntArray:
@@ -223,7 +224,7 @@ def _month(texts: Any) -> IntArray:
         return _whole(texts)
     names = compute.utf8_slice_codeunits(compute.utf8_lower(texts), 0, 3)
     places = compute.index_in(names, value_set=arrow.array(_MONTHS, arrow.string()))
-    return np.asarray(compute.fill_null(places, -1).to_numpy(zero_copy_only=False), dtype=np.int64) + 1
+    return values_of(compute.fill_null(places, -1)).astype(np.int64) + 1
 
 
 def _seconds(parts: dict[str, Any]) -> tuple[IntArray, BoolArray]:

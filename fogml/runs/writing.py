@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogml.arrow_arrays import table_of
 from fogml.errors import InputError
 from fogml.json_files import FAR_OFF
 from fogml.outputs import whole_file, whole_files
@@ -149,14 +150,12 @@ class BlockWriter:
         InputError
             If its columns are not those of the first block, or a value is not finite.
         """
-        import pyarrow as arrow
-
         if isinstance(block, Run):
             carried = carried_cells(block)
             block = {cell: block.columns[name] for name, cell in header_cells(block).items()}
         arrays = {cell: np.asarray(values) for cell, values in block.items()}
         _check_finite(self.path, arrays, carried, self._rows)
-        table = arrow.table(arrays)
+        table = table_of(arrays)
         self._rows += len(table)
         if self._schema is None:
             self._schema = table.schema

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as arrow
 import pytest
 
-from fogml.runs.arrow_values import float_values
+from fogml.arrow_arrays import table_of, values_of
 from tests.cli.conftest import csv_text
 
 
@@ -27,7 +27,19 @@ def test_values_are_those_of_arrows_own_conversion(kind: str, present: float) ->
         whole.slice(0, 0),
         arrow.chunked_array([], kind),
     ):
-        np.testing.assert_array_equal(float_values(column), column.to_numpy().astype(np.float64))
+        np.testing.assert_array_equal(values_of(column), column.to_numpy())
+
+
+@pytest.mark.parametrize("kind", ["f8", "i8", "f4", "bool", "U3"])
+def test_a_table_is_that_of_arrows_own_conversion(kind: str) -> None:
+    values = np.array([0, 1, 0, 2]).astype(kind)
+    table = table_of({"a": values, "b": values[::2].repeat(2)})
+    assert table.column_names == ["a", "b"]
+    assert (
+        table["a"].to_pylist() == values.tolist() and table["b"].to_pylist() == values[::2].repeat(2).tolist()
+    )
+    if kind != ">f8":
+        assert table.schema.field("a").type == arrow.array(values).type
 
 
 def test_a_run_is_read_and_a_shipped_one_without_pandas(tmp_path: Path) -> None:
