@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from fogml.runs.columns import parse_header
 from fogml.runs.header_spelling import DATE_NAMES, canonical_cells, uncommented, with_units_below
+from fogml.runs.labview_header import labview_header
 from fogml.runs.stamps import stamp_form
 
 SEPARATORS = (",", ";", "\t")
@@ -61,6 +62,9 @@ def find_header(lines: Sequence[str]) -> Header | None:
         filled = filled[1:]
     if not filled:
         return None
+    if (labview := labview_header(lines)) is not None:
+        place, separator, cells = labview
+        return Header(place, place + 1, separator, canonical_cells(cells))
     plain = []
     for i in filled[:_MOST_TITLE_LINES]:
         found = _header(lines, i, stated)

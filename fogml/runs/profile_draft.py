@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from fogml.runs.csv_header import fields_of, is_number_like
 from fogml.runs.csv_numbers import PLAIN, Marks, marks_of, number
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.header_spelling import canonical_cells, with_units_below
+from fogml.runs.labview_header import labview_header
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.runs.reader_process import stored_file
 from fogml.runs.reading import file_format
@@ -96,7 +98,11 @@ def _of_text(path: Path) -> tuple[list[str], list[_Field]]:
         _split(lines[i], mark) for i in above if not any(is_number_like(f) for f in _split(lines[i], mark))
     ]
     units: tuple[str, ...] | None = None
-    if not names:
+    if labview := labview_header(lines):
+        layout += [f"skip_lines: {data}", "header: false", f"fields: {width}"]
+        fields = [_Field(i, *parse_header(cell)) for i, cell in enumerate(canonical_cells(labview.cells))]
+        layout.append(f"# Fields: {', '.join(f'{f.source} {f.name}' for f in fields)}")
+    elif not names:
         layout += [f"skip_lines: {data}"] if data else []
         layout += ["header: false", f"fields: {width}"]
         fields = [_Field(i, f"column {i}", None) for i in range(width)]
@@ -139,12 +145,19 @@ def _table_of(text: str) -> tuple[str, list[str], int | None]:
         rows = [_split(line, mark) for line in lines[-_MOST_ROWS:] if line.strip()]
         counts = [len(row) for row in rows]
         width = max(set(counts), key=counts.count) if counts else 0
-        first = next((i for i, line in enumerate(lines) if _is_data(_split(line, mark), width)), None)
+        first = _first_of_longest([not t.strip() or _is_data(_split(t, mark), width) for t in lines], lines)
         numbers = [sum(is_number_like(f.strip(' "')) for f in row) for row in rows]
         score = float(np.median(numbers)) if numbers else 0.0
         if first is not None and score > best[0]:
             best = (score, name, first)
     return best[1], lines, best[2]
+
+
+def _first_of_longest(is_data: Sequence[bool], lines: Sequence[str]) -> int | None:
+    """Where the longest stretch of lines of numbers begins, blank ones apart; None where there is none."""
+    ends = [-1, *(i for i, data in enumerate(is_data) if not data), len(lines)]
+    stretches = [range(a + 1, b) for a, b in pairwise(ends)]
+    return next((i for i in max(stretches, key=len) if lines[i].strip()), None)
 
 
 def _is_data(fields: Sequence[str], width: int) -> bool:
@@ -267,7 +280,7 @@ def _gyro(one: _Field | None, many: bool) -> str:
     if unit is None and len(values) and np.all(values == np.round(values)):
         unit, why = "count", "whole numbers; with 'scale: 1/K' it may be deg/s or deg/h"
     else:
-        why = "the file states no unit"
+        why = f"the file says '{one.unit}': state a scale" if one.unit else "the file states no unit"
     return f"{{{source}unit: {unit or 'deg/s'}}}    {_MARK}{why}"
 
 

@@ -41,6 +41,31 @@ def thousandths(moment):
     return f"{moment:%H:%M:%S},{moment.microsecond // 1000:03d}"
 
 
+def labview(separator="\t", comma=False, names="X_Value,gyro,T_in,Comment", x_columns="One", rows=PLAIN):
+    """A measurement file as LabVIEW writes it: two blocks of keys, names, and rows without a comment."""
+    file = f"""LabVIEW Measurement,
+Writer_Version,2
+Separator,{"Comma" if separator == "," else "Tab"}
+Decimal_Separator,{"," if comma else "."}
+Multi_Headings,No
+X_Columns,{x_columns}
+Date,2026/01/05
+Time,10:00:00.25
+***End_of_Header***,
+,
+Channels,2,
+Samples,30,30,
+Date,2026/01/05,2026/01/05,
+Y_Unit_Label,deg/h,degC,
+X_Dimension,Time,Time,
+X0,0.0E+0,0.0E+0,
+Delta_X,0.5,0.5,
+***End_of_Header***,,,""".splitlines()
+    rows = [row.replace(",", separator) for row in rows]
+    text = "\n".join([*(line.replace(",", separator) for line in [*file, names]), *rows]) + "\n"
+    return text.replace(".", ",") if comma else text
+
+
 SHORT = "Time;Gyro [dph];T_in [C]"
 DAYS = [r.replace("28/", "03/").replace("29/", "04/") for r in stamped(lambda m: f"{m:%d/%m/%Y %H:%M:%S}")]
 TWO = stamped(lambda moment: f"{moment:%d.%m.%Y},{moment:%H:%M:%S.%f}")
@@ -61,6 +86,14 @@ FILES = {
     "german thousands": lines(
         HEADER.replace(",", ";"),
         [f"{german(t)};{german(g)};{german(w)}" for t, g, w in zip(TIME, GYRO, INNER, strict=True)],
+    ),
+    "LabVIEW": labview(),
+    "LabVIEW with commas": labview(","),
+    "LabVIEW with decimal commas": labview(comma=True),
+    "LabVIEW with a time for each channel": labview(
+        names="X_Value,gyro,X_Value,T_in,Comment",
+        x_columns="Multi",
+        rows=["{0},{1},{0},{2}".format(*row.split(",")) for row in PLAIN],
     ),
     "quotes": lines('"time [s]","gyro [deg/h]","T_in [degC]"', [f'"{r}"'.replace(",", '","') for r in PLAIN]),
     "carriage returns": lines().replace("\n", "\r"),

@@ -17,6 +17,7 @@ from fogml.runs.profile_draft import draft_profile
 from fogml.runs.profiles import import_recording, load_profile
 from fogml.runs.reading import read_run
 from tests.readers import files
+from tests.runs.test_headers import GYRO, labview
 
 COUNT = 60
 TIME = np.arange(COUNT) * 10
@@ -32,6 +33,7 @@ QUOTED = "Time (s),Note,Omega (dph),Wärme [°C]\n" + "".join(
 )
 QUOTED += "End of test\n"
 RETURNS = "t;state;val\r" + "".join(f"{i};{i % 3};{950 + i:,}\r".replace(",", ".") for i in range(COUNT))
+LABVIEW = labview(names="X_Value,Voltage_0,Thermistor_1,Comment").replace("deg/h\tdegC", "V\tOhm")
 UNITS = "Logger 3\nt,omega,die\n[ms],[deg/s],[°C]\n" + "".join(
     f"{t},{i}.5,{25}\n" for i, t in enumerate(TIME)
 )
@@ -60,9 +62,23 @@ UNITS = "Logger 3\nt,omega,die\n[ms],[deg/s],[°C]\n" + "".join(
             1,
         ),
         (RETURNS, np.arange(COUNT) + 950.0, ["gyro: {source: val, unit: count", 'decimal: ","'], 1),
+        (
+            LABVIEW,
+            3600.0 * GYRO,
+            ["time: {source: 0, unit: s}\n", "the file says 'V': state a scale", "2 Thermistor_1"],
+            1,
+        ),
         (UNITS, 3600.0 * (np.arange(COUNT) + 0.5), ["source: t, unit: ms}\n", "unit: deg/s}\n"], 1),
     ],
-    ids=["motion tracker", "german bench", "no header", "quotes and footer", "returns", "row of units"],
+    ids=[
+        "motion tracker",
+        "german bench",
+        "no header",
+        "quotes and footer",
+        "returns",
+        "LabVIEW",
+        "row of units",
+    ],
 )
 def test_text(tmp_path, text, gyro, told, runs):
     path, profile = tmp_path / "log.txt", tmp_path / "p.yaml"
