@@ -39,6 +39,7 @@ CASES = {
     "nothing changes, flicker": Months(flicker=1.0),
     "nothing changes, tails": Months(freedom=3),
     "nothing changes, random walk": Months(walk=0.1),
+    "step of 3": Months(shape="step", size=3.0),
     "step of 6": Months(shape="step", size=6.0),
     "step of 12": Months(shape="step", size=12.0),
     "step of 12 on flicker": Months(flicker=1.0, shape="step", size=12.0),

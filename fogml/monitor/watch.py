@@ -14,7 +14,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.monitor.changes import ChangePrior, Chart, Shape, change_chart
 from fogml.monitor.record import FIGURES, RunRecord
-from fogml.signals.distributions import student_ppf
+from fogml.monitor.trend import trend_quantiles
 
 DAY_S = 86400.0
 NEAREST: dict[tuple[str, Shape], tuple[str, ...]] = {
@@ -44,7 +44,8 @@ class Calibration:
     limit
         Greatest change of the level [deg/h].
     trend, trend_ci90
-        The level's slope over the runs since the last change [deg/h per day].
+        The level's slope over the runs since the last change [deg/h per day], median and interval, a bias
+        that wanders between the runs being allowed for.
     due_days, due_ci90
         Days from the last run until the level's change passes the limit: most likely, and the interval that
         holds it with 90 %; infinite where it does not within a hundred years.
@@ -197,23 +198,16 @@ def _in_order(records: Sequence[RunRecord]) -> tuple[list[RunRecord], FloatArray
 
 
 def _calibration(age: FloatArray, level: FloatArray, limit: float) -> Calibration | None:
-    """When a line through the levels passes a limit, by least squares; None for fewer than four runs."""
+    """When a line through the levels passes a limit; None for fewer than four runs."""
     n = len(age)
     if n < 4 or not np.ptp(age) > 0.0:
         return None
-    centred = age - age.mean()
-    v = float(centred @ centred)
-    trend = float(centred @ level) / v
-    left = level - level.mean() - trend * centred
-    half = float(student_ppf(0.95, n - 2))
-    deviation = float(np.sqrt(left @ left / (n - 2)))
-    slope_half = half * deviation / np.sqrt(v)
+    low, trend, high = trend_quantiles(age, level, (0.05, 0.5, 0.95))
 
     def due(slope: float) -> float:
         """Days from the last run until a line of that slope has gone as far as the limit."""
         days = limit / abs(slope) - float(np.ptp(age)) if slope else np.inf
         return max(days, 0.0) if days <= LONGEST_DAYS else float("inf")
 
-    low, high = trend - slope_half, trend + slope_half
     latest = float("inf") if low <= 0.0 <= high else due(min(low, high, key=abs))
     return Calibration(limit, trend, (low, high), due(trend), (due(max(low, high, key=abs)), latest))
