@@ -9,9 +9,6 @@ from importlib import import_module
 from typing import Any, ClassVar
 
 from numpy.typing import NDArray
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from fogml.errors import InputError, first_line
 from fogml.features.features import Features
@@ -82,6 +79,10 @@ class SklearnModel(FeatureModel):
         kind, options = self.check_options()
         if kind.__name__ == "GaussianProcessRegressor" and options.get("kernel") is None:
             options["kernel"] = _drift_kernel(width)
+        from sklearn.compose import TransformedTargetRegressor
+        from sklearn.pipeline import make_pipeline
+        from sklearn.preprocessing import StandardScaler
+
         scaled = make_pipeline(StandardScaler(), kind(**options))
         return TransformedTargetRegressor(scaled, transformer=StandardScaler())
 
@@ -138,6 +139,9 @@ class SklearnModel(FeatureModel):
         cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
     ) -> SklearnModel:
         """The model that `to_saved` gave."""
+        from sklearn.compose import TransformedTargetRegressor
+        from sklearn.preprocessing import StandardScaler
+
         saved = strictly(_Saved, values, "model")
         kind = sklearn_regressor_class(saved.name)
         model = cls(saved.name, saved.asked_features, saved.options or None, saved.max_rows, saved.seed)
