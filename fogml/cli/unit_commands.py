@@ -9,13 +9,8 @@ from pydantic import Field
 from fogml.cli import options
 from fogml.cli.given import argument, option
 from fogml.cli.settings import Settings
+from fogml.fleet.form import FORM
 from fogml.tracking import shown_tracker
-
-
-def _usual_form() -> str:
-    from fogml.fleet.constants import FORM
-
-    return FORM
 
 
 class FleetSettings(options.LimitSettings):
@@ -37,7 +32,7 @@ class FleetSettings(options.LimitSettings):
     models: list[str] = ["all"]
     form: Annotated[
         str, option("Features that the units' constants are compared in.", metavar="FEATURES")
-    ] = Field(default_factory=_usual_form)
+    ] = FORM
     prior: Annotated[
         str | None,
         option("Draw constants to those of an earlier fleet.", metavar="FLEET.JSON", reads=True),

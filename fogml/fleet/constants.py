@@ -17,6 +17,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.fleet.covariates import CovariateColumns, CovariateEffects, Covariates
+from fogml.fleet.form import FORM
 from fogml.intervals import SIGMA_PER_MEDIAN
 from fogml.models.box import learn_box
 from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
@@ -27,8 +28,6 @@ from fogml.models.table import run_rows
 from fogml.runs.run import Run
 from fogml.signals.distributions import chi2_ppf
 
-FORM = "T^1..3, dT, T*dT"
-"""The form that units are compared in, unless another is stated."""
 _ROUNDS = 200
 _TOLERANCE = 1e-6
 _FREEDOM = 5.0

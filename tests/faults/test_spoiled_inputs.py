@@ -100,7 +100,7 @@ def test_a_planted_fault_is_seen(what: str, tmp_path: Path) -> None:
     def do(index: int, home: Path) -> Outcome:
         return planted(home, what, limits)
 
-    limits = Limits(1.0 if what == "busy" else 60.0, 5.0 if what == "hang" else 240.0, 200 << 20)
+    limits = Limits(1.0 if what == "busy" else 60.0, 1.0 if what == "hang" else 240.0, 200 << 20)
     ((index, outcome),) = outcomes(1, do, tmp_path, limits)
     assert index == 0
     assert set(outcome.faults) == {"busy": {"hang"}, "nothing": set()}.get(what, {what}), json.dumps(
