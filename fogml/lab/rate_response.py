@@ -135,6 +135,8 @@ def slew(run: Run, plateaus: Plateaus, scale_factor: float = 1.0) -> Slew | None
         return None
     place = int(np.argmax(np.abs(np.diff(plateaus.rate))))
     height = float(plateaus.rate[place + 1] - plateaus.rate[place])
+    if height == 0.0:
+        return None
     rows = slice(int(plateaus.stop[place]) - 1, int(plateaus.stop[place + 1]))
     time = run.time[rows]
     table = (3600.0 * (run.rate[rows] - run.rate[rows.start])) / height

@@ -9,7 +9,6 @@ from datetime import date as Date
 import numpy as np
 from markupsafe import Markup
 
-from fogml.intervals import Z90
 from fogml.report import style
 from fogml.report.page import render
 from fogml.report.style import time_unit
@@ -191,11 +190,11 @@ def _figures(run: RunJudgement) -> Table:
         else:
             low, high = (number(end) for end in found.ci90)
             add(name, f"{number(found.value)} deg/h", f"{low} to {high}", f"{how}, n = {found.n}")
-    error, se = run.after.scale_factor_error, run.scale_factor_se
+    error, half = run.after.scale_factor_error, run.scale_factor_half_width
     add(
         "Scale factor error",
         _NOT_TOLD if error is None else f"{number(error)} ppm",
-        "" if error is None or se is None else f"{number(error - Z90 * se)} to {number(error + Z90 * se)}",
+        "" if error is None or half is None else f"{number(error - half)} to {number(error + half)}",
         "the table does not turn" if error is None else "all turns, by their scatter",
     )
     for name, term in (run.noise or {}).get("terms", {}).items():

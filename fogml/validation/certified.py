@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.signals.averages import freedom_of_deviation
 from fogml.signals.distributions import chi2_ppf
 from fogml.validation.results import RunJudgement
 
@@ -18,8 +19,9 @@ _COVERAGE = 0.9
 class Deviation:
     """Standard deviation of n averages over n - 1 [deg/h], and its 90 % interval.
 
-    The interval is that of independent normal averages, by chi-square with n - 1 degrees of freedom; a bias
-    that wanders makes it wider.
+    The interval is by chi-square with the degrees of freedom that the averages' spectrum leaves
+    (`fogml.signals.averages.freedom_of_deviation`): n - 1 where they are independent, fewer where the bias
+    wanders. Under a strong random walk it holds two thirds to four fifths.
     """
 
     value: float
@@ -29,12 +31,14 @@ class Deviation:
 
 def sample_deviation(values: FloatArray) -> Deviation | None:
     """Of averages [deg/h], shape (n,); None of fewer than three."""
-    return None if len(values) < 3 else _deviation(float(np.std(values, ddof=1)), len(values))
+    if len(values) < 3:
+        return None
+    return _deviation(float(np.std(values, ddof=1)), len(values), freedom_of_deviation(values))
 
 
-def _deviation(value: float, n: int) -> Deviation:
+def _deviation(value: float, n: int, freedom: float) -> Deviation:
     outside = 0.5 * (1.0 - _COVERAGE)
-    low, high = (value * float(np.sqrt((n - 1) / chi2_ppf(p, n - 1))) for p in (1.0 - outside, outside))
+    low, high = (value * float(np.sqrt(freedom / chi2_ppf(p, freedom))) for p in (1.0 - outside, outside))
     return Deviation(value, (low, high), n)
 
 
@@ -66,7 +70,7 @@ def of_10_s(run: RunJudgement) -> Deviation | None:
     if stability is None or n < 3:
         return None
     # The figures' own is over n.
-    return _deviation(stability * float(np.sqrt(n / (n - 1))), n)
+    return _deviation(stability * float(np.sqrt(n / (n - 1))), n, run.short_freedom or n - 1.0)
 
 
 def set_up(run: RunJudgement) -> dict[str, Any]:
@@ -88,7 +92,7 @@ def set_up(run: RunJudgement) -> dict[str, Any]:
 def with_uncertainty(run: RunJudgement) -> dict[str, Any]:
     """Figures after compensation over n - 1 with their intervals [deg/h], ready for JSON.
 
-    Null where the run does not tell; ``scale_factor_error_se`` is in ppm.
+    Null where the run does not tell; ``scale_factor_error_se`` and its interval's half-width are in ppm.
     """
     figures = {
         "bias_stability_over_temperature": over_temperature(run),
@@ -96,4 +100,8 @@ def with_uncertainty(run: RunJudgement) -> dict[str, Any]:
         "bias_stability_10s": of_10_s(run),
     }
     told = {name: None if found is None else asdict(found) for name, found in figures.items()}
-    return {**told, "scale_factor_error_se": run.scale_factor_se}
+    return {
+        **told,
+        "scale_factor_error_se": run.scale_factor_se,
+        "scale_factor_error_half_width_90": run.scale_factor_half_width,
+    }

@@ -207,6 +207,7 @@ def judge_run(
         )
         findings = (*findings, Finding("outside_training", message, count=outside))
     floor = floor_of_run(run, used, errors.before, averaging_s, noise)
+    scale_se, scale_half = metrics.scale_factor_spread(after)
     return RunJudgement(
         run=run.name,
         unit=run.facts.unit,
@@ -228,7 +229,9 @@ def judge_run(
         power_on_known=run.facts.powered_on is not None,
         facts=run.facts,
         short_averages=metrics.short_averages,
-        scale_factor_se=metrics.scale_factor_se(after),
+        short_freedom=metrics.short_freedom(after),
+        scale_factor_se=scale_se,
+        scale_factor_half_width=scale_half,
         soaks=metrics.soak_biases(before, after),
         not_settled=float((errors.flag[used] == NOT_FULL).mean()),
         table_rates=(float(run.rate.min()), float(run.rate.max())) if "rate" in run.columns else None,

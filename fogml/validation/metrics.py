@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.signals.averages import BlockAverages, block_averages
+from fogml.signals.averages import BlockAverages, block_averages, freedom_of_deviation
 from fogml.validation.rate_ladder import find_ladder, ladder_figures
 from fogml.validation.results import BeforeAfter, Metrics, Repeatability, RunJudgement, SoakBias
 from fogml.validation.scale_factor import LEAST_SHARE, find_steps, scale_factor_error
@@ -197,9 +197,19 @@ class RunMetrics:
             return 0
         return len(self.averages(self._time, window_s=SHORT_AVERAGING_S))
 
-    def scale_factor_se(self, error_deg_h: FloatArray) -> float | None:
-        """Standard error of the scale factor error of an error series of the whole run [ppm]."""
-        return None if self._steps is None else scale_factor_error(self._steps, error_deg_h).se
+    def scale_factor_spread(self, error_deg_h: FloatArray) -> tuple[float | None, float | None]:
+        """Standard error and 90 % half-width of the scale factor error of an error series [ppm]."""
+        if self._steps is None:
+            return None, None
+        found = scale_factor_error(self._steps, error_deg_h)
+        return found.se, found.half_width
+
+    def short_freedom(self, error_deg_h: FloatArray) -> float:
+        """Degrees of freedom of the bias stability at 10 s; 0 where there is none."""
+        if not self.short_averages:
+            return 0.0
+        averages = self.averages(error_deg_h[self.used], window_s=SHORT_AVERAGING_S)
+        return freedom_of_deviation(averages.values[0])
 
     def averages(self, *columns: FloatArray, window_s: float | None = None) -> BlockAverages:
         """Averages over the averaging time of columns that hold the used rows only."""

@@ -103,10 +103,11 @@ class RunJudgement:
     none is recorded. ``floor`` is the noise at ``averaging_s`` [deg/h] as `fogml.signals.floor` defines it,
     with its 90 % interval and where it comes from; ``noise`` the run's own Allan terms with their intervals
     and the raw minimum, as in ``noise.json``, None where the run is too short for them. ``short_averages`` is
-    how many averages over 10 s there are, ``scale_factor_se`` the standard error of the scale factor error
-    after compensation [ppm], by what the turns scatter about it, ``soaks`` the
-    bias at each soak, ``not_settled`` the share of the rows used at which a window was not wholly full or a
-    memory still went by what was before the run.
+    how many averages over 10 s there are, ``short_freedom`` the degrees of freedom of their deviation,
+    ``scale_factor_se`` and ``scale_factor_half_width`` the standard error of the scale factor error after
+    compensation and the half-width of its 90 % interval [ppm], by what the turns scatter about it,
+    ``soaks`` the bias at each soak, ``not_settled`` the share of the rows used at which a window was not
+    wholly full or a memory still went by what was before the run.
     """
 
     run: str
@@ -130,7 +131,9 @@ class RunJudgement:
     floor_ci90: tuple[float, float] | None = None
     floor_source: str = "the run itself"
     short_averages: int = 0
+    short_freedom: float = 0.0
     scale_factor_se: float | None = None
+    scale_factor_half_width: float | None = None
     soaks: tuple[SoakBias, ...] = ()
     not_settled: float = 0.0
 

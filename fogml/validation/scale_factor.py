@@ -15,6 +15,7 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.run import Run
 from fogml.runs.transitions import find_transitions, transition_mask
 from fogml.runs.turning import least_rate_deg_s
+from fogml.signals.distributions import student_ppf
 
 LEAST_SHARE = 0.02
 """Turns smaller than this share of the run's greatest tell little of it but noise, each for itself."""
@@ -80,13 +81,15 @@ class ScaleFactorError:
     """Scale factor error [ppm]: by least squares over all steps, and the greatest of single turns.
 
     The greatest is that of the turns of some size; `left_out` is how many others there are. `se` is the
-    standard error of the first by what the turns scatter about it [ppm], None for one turn.
+    standard error of the first by what the turns scatter about it, and `half_width` that of its 90 % interval
+    [ppm], by Student's t, as few turns tell little of their scatter; None for one turn.
     """
 
     overall: float
     largest: float
     left_out: int = 0
     se: float | None = None
+    half_width: float | None = None
 
 
 def find_steps(run: Run, full: BoolArray) -> Steps | None:
@@ -151,20 +154,26 @@ def scale_factor_error(steps: Steps, error_deg_h: FloatArray) -> ScaleFactorErro
     each = np.bincount(member, products, len(turns)) / weight
     large = np.bincount(member, steps.large, len(turns)) > 0
     overall = float(products.sum() / squares.sum())
+    se, half_width = _spread(each - overall, weight)
     return ScaleFactorError(
         overall=1e6 * overall,
         largest=float(1e6 * np.abs(each[large]).max()),
         left_out=int((~large).sum()),
-        se=_standard_error(each - overall, weight),
+        se=se,
+        half_width=half_width,
     )
 
 
-def _standard_error(off: FloatArray, weight: FloatArray) -> float | None:
-    """Of a weighted mean of turns [ppm] that are `off` it, each by its own; None for one turn.
+def _spread(off: FloatArray, weight: FloatArray) -> tuple[float, float] | tuple[None, None]:
+    """Standard error of a weighted mean of turns that are `off` it, and its 90 % half-width [ppm].
 
     A turn is one, as its steps share pieces.
     """
     turns = len(off)
     if turns < 2:
-        return None
-    return float(1e6 * np.sqrt(weight**2 @ off**2 * turns / (turns - 1)) / weight.sum())
+        return None, None
+    se = float(1e6 * np.sqrt(weight**2 @ off**2 * turns / (turns - 1)) / weight.sum())
+    # Turns that weigh little add little to what is known of the scatter.
+    squares = weight**2
+    freedom = max(float(squares.sum() ** 2 / (squares @ squares)) - 1.0, 1.0)
+    return se, se * float(student_ppf(0.95, freedom))

@@ -1,0 +1,49 @@
+"""Intervals of a certificate's figures, against the scatter of repeated series."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, t
+
+from fogml.intervals import Z90
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+from fogml.signals.averages import freedom_of_deviation
+from fogml.validation.certified import sample_deviation
+from fogml.validation.scale_factor import find_steps, scale_factor_error
+
+
+def lagged(rng: np.random.Generator, share: float) -> np.ndarray:
+    """A Gauss-Markov series of 200 averages."""
+    series = np.zeros(400)
+    for place, step in enumerate(rng.standard_normal(399), start=1):
+        series[place] = share * series[place - 1] + step
+    return series[200:]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.8])
+def test_the_interval_of_a_deviation_counts_that_neighbours_are_alike(share: float) -> None:
+    series = [lagged(np.random.default_rng(seed), share) for seed in range(150)]
+    told = [sample_deviation(one) for one in series]
+    expected = np.sqrt(np.mean([one.value**2 for one in told]))
+    held = [one.ci90[0] <= expected <= one.ci90[1] for one in told]
+    assert 0.82 <= np.mean(held) <= 0.97
+    # sum over lags of the squared correlations: (1 + share**2) / (1 - share**2).
+    freedom = np.median([freedom_of_deviation(one) for one in series])
+    assert freedom == pytest.approx(199.0 * (1.0 - share**2) / (1.0 + share**2), rel=0.25)
+    if share:
+        alike = [one.value * np.sqrt(199.0 / chi2.ppf([0.95, 0.05], 199)) for one in told]
+        assert np.mean([low <= expected <= high for low, high in alike]) < 0.75
+
+
+def test_few_turns_tell_a_scale_factor_by_student_s_t() -> None:
+    rng = np.random.default_rng(0)
+    rate = np.concatenate((*[np.repeat([0.0, 10.0, -10.0], [300, 60, 60])] * 3, np.zeros(300)))
+    gyro = 3600.0 * rate + rng.standard_normal(len(rate))
+    run = Run("turns", {"time": 1.0 + np.arange(len(rate)), "rate": rate, "gyro": gyro}, Facts())
+    steps = find_steps(run, np.ones(len(run), dtype=np.bool_))
+    assert steps is not None
+    error = scale_factor_error(steps, gyro - 3600.0 * rate)
+    assert error.se is not None and error.half_width == pytest.approx(error.se * t.ppf(0.95, 2), rel=1e-3)
+    assert error.half_width > 1.5 * Z90 * error.se
