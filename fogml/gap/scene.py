@@ -222,6 +222,7 @@ def outstanding_lines(scene: Scene) -> tuple[float, ...]:
     if len(frequencies) < grids.line_neighbours:
         return tuple(float(f) for f in frequencies[:count])
     power = np.zeros(len(frequencies))
+    comb = math.isqrt(len(frequencies))
     for rows in scene.fit:
         phase = np.pi * (rows.time_s - rows.time_s[0]) / max(rows.time_s[-1] - rows.time_s[0], 1.0)
         order = max(int((rows.time_s[-1] - rows.time_s[0]) / grids.drift_s), 1)
@@ -229,8 +230,11 @@ def outstanding_lines(scene: Scene) -> tuple[float, ...]:
         known = np.concatenate([smooth, rows.constants], axis=1)
         known = known / np.maximum(np.linalg.norm(known, axis=0), 1e-300)
         left = rows.gap - known @ np.linalg.lstsq(known, rows.gap, rcond=1e-10)[0]
-        waves = np.exp(-2j * np.pi * np.outer(frequencies, rows.time_s))
-        power += np.abs(waves @ left) ** 2 / max(float(left @ left), 1e-300)
+        # Each frequency is one of a coarse comb and one of a fine one: exponentials of two short lists.
+        coarse = np.exp(-2j * np.pi * np.outer(frequencies[::comb], rows.time_s))
+        fine = np.exp(-2j * np.pi * np.outer(step * np.arange(comb), rows.time_s))
+        waves = ((coarse * left) @ fine.T).ravel()[: len(frequencies)]
+        power += np.abs(waves) ** 2 / max(float(left @ left), 1e-300)
     power /= np.maximum(median_filter(power, grids.line_neighbours, mode="nearest"), 1e-300)
     peaks = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
     best = peaks[np.argsort(-power[peaks])][:count]
