@@ -128,7 +128,7 @@ def test_a_run_without_the_temperature_that_the_model_needs(invoke, model, run_f
 
 def test_what_a_memory_waits_for_is_told_with_what_is_left_there(invoke, run_files, tmp_path):
     """A play of half width 15 degC is told once the run has spanned 30 of its 40 degC."""
-    runs, out = (run_files[0], "--test", run_files[1]), tmp_path / "out"
+    runs, out = (run_files[0], "--test", run_files[1], "--model", "polynomial"), tmp_path / "out"
     told = invoke("train", *runs, "--features", "T, play(T, 15 degC)", "-o", out).stdout
     assert "windows are full and its memories settled (flag 2)" in " ".join(told.split())
     (run,) = json.loads((out / "report.json").read_text())["test"]
