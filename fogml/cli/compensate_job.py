@@ -50,7 +50,7 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     ):
         counts = _compensate(model, chain(begun, blocks), out, settings.any_unit, work)
     memories = [atom.text for atom in model.features_.atoms if atom.settles] if model.features_ else []
-    _print(settings, model.kind, memories, counts, terminal)
+    _print(settings, model.describe()["kind"], memories, counts, terminal)
 
 
 def _compensate(model: DriftModel, blocks: Iterable[Run], out: Path, any_unit: bool, work: Work) -> IntArray:

@@ -42,7 +42,7 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
             settings.sample_s,
             settings.seed,
         )
-        with terminal.work(f"exporting {models[0].kind} to {settings.to}"):
+        with terminal.work(f"exporting {models[0].describe()['kind']} to {settings.to}"):
             matrix = None if settings.matrix is None else Path(settings.matrix)
             if settings.to in TABLE_TARGETS:
                 tables = TableSettings(

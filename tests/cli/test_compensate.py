@@ -42,11 +42,15 @@ def test_equals_the_model_on_the_whole_run(invoke_json, model, run_files, tmp_pa
 
 def test_a_shipped_run(invoke_json, tmp_path):
     out = tmp_path / "out"
-    arguments = ("--model", "M1", "--averaging", "10", "-o", out)
-    invoke_json("train", "shipped:thermal-cycle-2-x", "--test", "shipped:thermal-cycle-3-x", *arguments)
+    arguments = ("--averaging", "10", "-o", out)
+    told = invoke_json(
+        "train", "shipped:thermal-cycle-2-x", "--test", "shipped:thermal-cycle-3-x", *arguments
+    )
     written = tmp_path / "written.csv"
     values = invoke_json("compensate", "shipped:thermal-cycle-3-x", "--model", out / "model", "-o", written)
     assert len(read_run(written)) == values["rows"] == len(shipped_run("thermal-cycle-3-x"))
+    # What was chosen has one name.
+    assert values["model"] == told["model"]["kind"] != "auto"
 
 
 def test_samples_outside_training_are_flagged(invoke_json, model, tmp_path):
