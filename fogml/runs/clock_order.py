@@ -1,7 +1,7 @@
-"""A clock that goes back or repeats: rows swapped or repeated, a wrapped counter, a restart, coarse stamps.
+"""A clock that goes back or repeats: rows swapped or repeated, a counter, an hour, a restart, coarse stamps.
 
 Each is told from the others by what the times are like once it is undone, and each has its own cure: rows are
-sorted, repeats dropped, a counter unwrapped, a recording cut into legs, stamps spread.
+sorted, repeats dropped, a counter unwrapped, an hour added, a recording cut into legs, stamps spread.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ TICKS_S = (1e-9, 1e-6, 1e-4, 1e-3)
 """Ticks of counters [s] beside the unit that the column states."""
 FEW_REPEATS = 0.02
 """Share of rows that may show the time of the row before and still be single faults."""
+HOUR_S = 3600.0
+"""What local time is put back by at the end of summer time [s]."""
 MOST_LEGS = 100
 """Restarts from which on a clock is no clock."""
 SHORTEST_LEG = 10
@@ -112,6 +114,7 @@ def in_order(
     if float(np.ptp(time)) == 0.0:
         return Ordered(clock.rows, time, (slice(0, len(time)),), hopeless="it stands still")
     _unwrap(clock, tick_s)
+    _add_hour(clock)
     _drop_repeats(clock, columns)
     legs = _legs(clock)
     if legs is None:
@@ -150,6 +153,25 @@ def _unwrap(clock: _Clock, tick_s: float) -> None:
                 told = f"a counter of {bits} bits of {tick:g} s wraps {times}"
                 clock.note("repaired_wrap", told, "unwraps it", "unwrapped", int(wraps[0]) + 1, len(wraps))
                 return
+
+
+def _add_hour(clock: _Clock) -> None:
+    """Add the hour that local time is put back by in autumn, where rows go on right after it.
+
+    A recording that begins anew begins where its clock did, and is none of it.
+    """
+    time = clock.time
+    steps = np.diff(time)
+    back = np.flatnonzero(steps < 0.0)
+    if len(back) != 1 or not (steps > 0.0).any():
+        return
+    near = _NEAR * float(np.median(steps[steps > 0.0]))
+    at = int(back[0])
+    if 0.0 < steps[at] + HOUR_S <= near < HOUR_S and abs(time[at + 1] - time[0]) > near:
+        clock.time = time.copy()
+        clock.time[at + 1 :] += HOUR_S
+        told = "the clock is put back by one hour, as local time is in autumn"
+        clock.note("repaired_hour", told, "adds the hour from there on", "added from there on", at + 1, 1)
 
 
 def _drop_repeats(clock: _Clock, columns: Mapping[str, FloatArray]) -> None:

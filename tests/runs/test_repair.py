@@ -93,6 +93,25 @@ def test_a_signed_counter_too(tmp_path):
     np.testing.assert_allclose(np.diff(run.time), 1e-6 * np.diff(TICKS), rtol=1e-9)
 
 
+@pytest.mark.parametrize("first_row", [100, 1300])
+def test_an_hour_put_back_in_autumn_is_added(tmp_path, first_row):
+    even = 2.0 * np.arange(4000)
+    local = np.where(np.arange(4000) < 3000, even, even - 3600.0)[first_row:]
+    path = file_of(tmp_path, ".csv", local, np.arange(len(local)) * 1.0)
+    with pytest.raises(InputError, match=r"put back by one hour.*--repair adds the hour from there on"):
+        read_run(path)
+    run = read_run(path, repair=True)
+    np.testing.assert_array_equal(run.time, even[first_row:])
+    assert counts(run) == {"repaired_hour": 1}
+    whole = np.concatenate([block.time for block in read_blocks(path, repair=True, block_rows=700)])
+    np.testing.assert_array_equal(whole, run.time)
+
+
+def test_a_recording_of_an_hour_that_begins_anew_is_two(tmp_path):
+    time = np.tile(2.0 * np.arange(1800), 2)
+    assert len(read_runs(file_of(tmp_path, ".csv", time, np.arange(3600.0)), repair=True)) == 2
+
+
 @pytest.mark.parametrize("second", [0.0, 0.037, -300.0])
 def test_a_restarted_clock_makes_legs(tmp_path, second):
     time = np.concatenate([0.1 * np.arange(500) + 400.0, 0.1 * np.arange(700) + 400.0 + second])
