@@ -145,11 +145,22 @@ def conversion(name: str, unit: str | None, file: str) -> tuple[float, float]:
         )
     found = spec.units.get(unit) or converted(unit, spec.internal)
     if found is None:
+        angle = converted(unit, "deg") if spec.internal in ("deg/h", "deg/s") else None
         raise InputError(
             f"{file}: column '{name}' has unit {quoted(unit)}, not accepted here; "
-            f"{known_are(unit, spec.units, 'accepted units')}"
+            f"{known_are(unit, spec.units, 'accepted units')}{_of_a_sample(angle)}"
         )
     return found
+
+
+def _of_a_sample(angle: tuple[float, float] | None) -> str:
+    """What makes a rate of angles, given what brings them to degrees; nothing where they are none."""
+    if angle is None:
+        return ""
+    return (
+        "; where it is the angle turned in a sample, an import profile makes a rate of it: unit deg/s, "
+        f"scale {angle[0]:.6g} over the sample interval in seconds"
+    )
 
 
 def is_accepted(name: str, unit: str | None) -> bool:

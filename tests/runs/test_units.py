@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
+import numpy as np
 import pytest
 
+from fogml.errors import InputError
+from fogml.runs.profiles import import_recording
+from fogml.runs.reading import read_run
 from fogml.runs.units import converted
 
 
@@ -30,3 +36,19 @@ def test_units_by_what_they_are(unit: str, internal: str, factor: float) -> None
 )
 def test_multiples_of_hours_and_minutes_are_slips(unit: str, internal: str) -> None:
     assert converted(unit, internal) is None
+
+
+@pytest.mark.parametrize("unit", ["arcsec", "deg", "urad"])
+def test_angles_of_a_sample_are_refused_with_the_profile_that_makes_rates_of_them(tmp_path, unit):
+    angles = np.arange(40.0)
+    path, profile = tmp_path / "log.csv", tmp_path / "profile.yaml"
+    path.write_text(f"time [s],gyro [{unit}]\n" + "".join(f"{0.5 * i},{a}\n" for i, a in enumerate(angles)))
+    with pytest.raises(InputError, match="the angle turned in a sample") as refused:
+        read_run(path)
+    scale = float(re.search(r"scale (\S+) over the sample interval", str(refused.value))[1]) / 0.5
+    gyro = f"{{source: 'gyro [{unit}]', unit: deg/s, scale: {scale}}}"
+    columns = f"columns: {{time: {{source: 'time [s]', unit: s}}, gyro: {gyro}}}\n"
+    profile.write_text("schema: fogml.import/1\ndescription: angles\nseparator: comma\n" + columns)
+    (run,) = import_recording(path, profile)
+    in_degrees = {"arcsec": 1.0 / 3600.0, "deg": 1.0, "urad": np.degrees(1e-6)}[unit]
+    np.testing.assert_allclose(run.gyro, 3600.0 * angles * in_degrees / 0.5, rtol=1e-5)
