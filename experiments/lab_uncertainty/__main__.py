@@ -1,0 +1,139 @@
+"""Whether stated uncertainties hold: ``python -m experiments.lab_uncertainty``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from experiments.lab_uncertainty import certificates, joint, models, monitor, north, rate, response, service
+from experiments.results import write_results
+from fogml import __version__
+
+HERE = Path(__file__).parent
+SEED = 5
+PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
+    (
+        "North (`lab north --positions`)",
+        north,
+        200,
+        "Azimuth and latitude at random, 4 × 60 s at 1 Hz unless told, a steady bias. A bias that "
+        "bends at start-up and errors of the table's angles are in no standard error.",
+    ),
+    (
+        "Rate table (`lab rate`)",
+        rate,
+        200,
+        "Rates of 5 to 100 deg/s either way, a minute each, table and gyro settling with 0.3 s. Of "
+        "a gyro that is not linear the misfit counts as scatter, and three rates leave one degree "
+        "of freedom: both are wide.",
+    ),
+    (
+        "Small rates, oscillations, turns (`lab rate`, certificates)",
+        response,
+        200,
+        "A threshold is told at two standard errors.",
+    ),
+    ("Deviations on certificates", certificates, 400, "The truth is the mean square over all runs."),
+    (
+        "Coefficients of drift models (`train`)",
+        joint,
+        100,
+        "Cycles of 6 + 5 soaks from −40 to 60 °C; thermometers of 1/16 °C. The truth is of the "
+        "temperature at the coil: where the recorded one lags by minutes or is rounded to degrees, "
+        "the coefficient of its rate is another one, and no interval holds that.",
+    ),
+    (
+        "Prediction intervals on another run (`train`)",
+        models,
+        60,
+        "Runs up and down at rates and with noise of their own; the mean share of averages over all "
+        "runs, as averages of one run are alike. One run says nothing of how the next one differs.",
+    ),
+    (
+        "A run in service (`monitor`)",
+        service,
+        200,
+        "Figures of a run beyond its model, and the trend over a unit's runs. A run of less than "
+        "an hour tells little of its noise. Units that gave an alarm are left out of the trend.",
+    ),
+    (
+        "Alarms (`monitor`)",
+        monitor,
+        200,
+        f"{monitor.RUNS} runs of a unit, an alarm past {monitor.LIMIT:.0f}; stated is at most. "
+        "Sizes are those at the moment of the first alarm after the change: what is noticed early "
+        "looked large, so that steps near the least that is noticed are overstated.",
+    ),
+)
+
+
+def measured(repeats: int | None = None) -> dict[str, list[dict[str, Any]]]:
+    """Rows of every part; with other `repeats` than the page's where given."""
+    return {
+        title: [row for case in part.CASES for row in part.measured(case, repeats or usual, SEED)]
+        for title, part, usual, _ in PARTS
+    }
+
+
+def page(rows: dict[str, list[dict[str, Any]]], before: dict[str, float]) -> str:
+    """The result page."""
+    parts = [
+        f"# Do stated uncertainties hold?\n\nfogml {__version__}. **Synthetic**, in plain NumPy, "
+        "nothing of fogml's simulator: white noise, flicker and a random walk of tactical (0.02 "
+        "deg/√h, 0.05 deg/h, 0.05 deg/h/√h) and navigation grade (0.001, 0.002, 0.005), counts, "
+        "dropped rows, thermometers that lag, settling; truths at random. *Held*: share of 90 % "
+        "intervals that hold the truth, with its 95 % interval by Wilson; *before*: as the version "
+        "before this measurement held. Errors are over the stated standard error. `python -m "
+        "experiments.lab_uncertainty`.\n"
+    ]
+    for title, _, _, words in PARTS:
+        lines = [
+            f"\n## {title}\n\n{words}\n",
+            "| case | of | runs | held | before | mean error | rms error |",
+        ]
+        lines.append("|---|---|---:|---:|---:|---:|---:|")
+        verdicts = ["| case | verdict | runs | wrong | stated at most |", "|---|---|---:|---:|---:|"]
+        for row in rows[title]:
+            low, high = (f"{100.0 * end:.0f}" for end in row.get("wilson95", (0.0, 0.0)))
+            if "wrong" in row:
+                share = f"{100.0 * row['wrong']:.0f} % ({low} to {high})"
+                stated = f"{100.0 * row['stated']:.0f} %"
+                verdicts.append(f"| {row['case']} | {row['quantity']} | {row['runs']} | {share} | {stated} |")
+                continue
+            told = "not stated" if row["held"] is None else f"{100.0 * row['held']:.0f} % ({low} to {high})"
+            old = before.get(f"{row['case']}: {row['quantity']}")
+            errors = (_signed(row.get(key), sign) for key, sign in (("mean_z", "+"), ("rms_z", "")))
+            runs = str(row["runs"]) if row["stated"] == row["runs"] else f"{row['stated']} of {row['runs']}"
+            was = "" if old is None else f"{100.0 * old:.0f} %"
+            lines.append(
+                f"| {row['case']} | {row['quantity']} | {runs} | {told} | {was} | {' | '.join(errors)} |"
+            )
+        parts.append("\n".join(lines if len(lines) > 3 else lines[:1]) + "\n")
+        if len(verdicts) > 2:
+            parts.append("\n" + "\n".join(verdicts) + "\n")
+    return "".join(parts)
+
+
+def _signed(value: float | None, sign: str) -> str:
+    return "" if value is None else f"{value:{sign}.2f}".replace("-", "\N{MINUS SIGN}")
+
+
+def main() -> None:
+    """Measure and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--repeats", type=int, default=None, help="fewer than the page's, which is not written"
+    )
+    repeats = parser.parse_args().repeats
+    rows = measured(repeats)
+    text = page(rows, json.loads((HERE / "before.json").read_text(encoding="utf-8")))
+    if repeats is None:
+        write_results(HERE, rows, text)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+"""Prediction intervals of drift models on runs that they have not seen, against plain truths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.lab_uncertainty.signals import Noise, lagged, thermometer
+from fogml.models.names import make_model
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+
+TACTICAL = Noise(0.02, 0.05, 0.05)
+
+
+@dataclass(frozen=True)
+class Training:
+    """A model by name, the runs that it learns from, and how far the bias moves from run to run [deg/h]."""
+
+    model: str
+    runs: int = 1
+    moves: float = 0.0
+    resolution: float = 1.0 / 64.0
+
+
+CASES = {
+    "rbf, one run": Training("rbf"),
+    "rbf, three runs, bias moves": Training("rbf", 3, 0.05),
+    "rbf-patent, one run": Training("rbf-patent"),
+    "multipoint-2-1, one run": Training("multipoint-2-1"),
+    "polynomial, one run": Training("polynomial"),
+    "polynomial, three runs, bias moves": Training("polynomial", 3, 0.05),
+}
+
+
+def recorded(case: Training, size: Any, rng: np.random.Generator, number: int) -> Run:
+    """A run up and down at a rate of its own, with the bias of a gyro of `size`, moved by chance."""
+    step = 10.0
+    low, high, rate = -10.0, 50.0, rng.uniform(0.15, 0.3)
+    ramp = round((high - low) / rate * 60.0 / step)
+    soak = round(3600.0 / step)
+    chamber = np.concatenate(
+        [np.full(soak, low), np.linspace(low, high, ramp), np.full(soak, high), np.linspace(high, low, ramp)]
+    )
+    coil = lagged(chamber, step, 600.0)
+    outer = lagged(chamber, step, 200.0)
+    change = np.gradient(coil, step / 60.0)
+    scaled = (coil - 20.0) / 30.0
+    bias = size[0] * scaled + size[1] * scaled**2 + size[2] * np.sin(3.0 * scaled)
+    bias = bias + (size[3] + size[4] * scaled) * change + case.moves * rng.standard_normal()
+    gyro = bias + TACTICAL.draw(rng, len(bias), step)
+    columns = {"time": step * (np.arange(len(bias)) + 1.0), "gyro": gyro}
+    names = ("T1", "T2", "T3", "T4") if case.model.startswith("multi") else ("T_in", "T_out")
+    seen = (coil, outer) if len(names) == 2 else (coil, outer, 0.7 * coil + 0.3 * outer, chamber)
+    for name, values in zip(names, seen, strict=True):
+        columns[name] = thermometer(rng, values, step, 1e-3, case.resolution)
+    return Run(f"run {number}", columns, Facts(unit="U", axis="z", latitude=0.0, input_axis="up"))
+
+
+def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
+    """The row of one case: mean share of a run's averages in the 90 % interval, and its scatter over runs."""
+    case, shares = CASES[name], []
+    for repeat in range(repeats):
+        rng = np.random.default_rng([seed, repeat])
+        size = np.array([0.3, 0.2, 0.1, 0.3, 0.1]) * rng.standard_normal(5)
+        runs = [recorded(case, size, rng, number) for number in range(case.runs + 1)]
+        model = make_model(case.model).fit(runs[:-1])
+        test = runs[-1]
+        found = model.evaluate(test)
+        rows = len(test) // 10 * 10
+        left = (test.error_deg_h - found.drift)[:rows].reshape(-1, 10).mean(axis=1)
+        half = model.intervals_.half_width(0.9, found.excess)[:rows].reshape(-1, 10).mean(axis=1)
+        whole = found.full[:rows].reshape(-1, 10).all(axis=1)
+        shares.append(float(np.mean(np.abs(left[whole]) <= half[whole])))
+    # A run's averages are not independent: runs are what is counted.
+    held = float(np.mean(shares))
+    error = 1.96 * float(np.std(shares, ddof=1)) / np.sqrt(repeats)
+    return [
+        {
+            "case": name,
+            "quantity": "averages over 100 s on another run",
+            "runs": repeats,
+            "stated": repeats,
+            "held": held,
+            "wilson95": (held - float(error), min(held + float(error), 1.0)),
+            "mean_z": None,
+            "rms_z": None,
+            "rms_error": None,
+            "median_se": None,
+        }
+    ]
