@@ -34,7 +34,8 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         "Small rates, oscillations, turns (`lab rate`, certificates)",
         response,
         200,
-        "A threshold is told at two standard errors.",
+        "Before, a lag of 1 s put the scale factor off by 128 ppm. A threshold is told at two "
+        "standard errors.",
     ),
     ("Deviations on certificates", certificates, 400, "The truth is the mean square over all runs."),
     (

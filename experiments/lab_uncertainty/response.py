@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from experiments.lab_uncertainty.measure import Told, coverage, of_errors, share
-from experiments.lab_uncertainty.signals import Noise
+from experiments.lab_uncertainty.signals import Noise, lagged
 from fogml.arrays import FloatArray
 from fogml.lab.rate_json import rate_json
 from fogml.runs.facts import Facts
@@ -39,10 +39,11 @@ class Waves:
 
 @dataclass(frozen=True)
 class Turns:
-    """Turns by 10 deg/s each way, of a minute, between rests of ten."""
+    """Turns by 10 deg/s each way, of a minute, between rests of ten; the lag [s] is behind commands."""
 
     noise: Noise
     turns: int = 5
+    lag_s: float = 1e-3
 
 
 CASES: dict[str, SmallRates | Waves | Turns] = {
@@ -54,6 +55,7 @@ CASES: dict[str, SmallRates | Waves | Turns] = {
     "oscillations, flicker": Waves(Noise(0.001, 0.2)),
     "5 turns": Turns(TACTICAL),
     "3 turns, navigation grade": Turns(NAVIGATION, turns=3),
+    "5 turns, navigation grade, lag of 1 s": Turns(NAVIGATION, lag_s=1.0),
 }
 
 
@@ -102,7 +104,7 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
             true = 20e-6 * rng.standard_normal()
             turn = np.concatenate((np.zeros(600), np.full(60, 10.0), np.full(60, -10.0)))
             rate = np.concatenate((*[turn] * case.turns, np.zeros(600)))
-            run = _run(rate, 3600.0 * rate * (1.0 + true), case.noise, rng, 1.0)
+            run = _run(rate, 3600.0 * lagged(rate, 1.0, case.lag_s) * (1.0 + true), case.noise, rng, 1.0)
             steps = find_steps(run, np.ones(len(run), dtype=np.bool_))
             assert steps is not None
             error = scale_factor_error(steps, run.gyro_deg_h - 3600.0 * run.rate)

@@ -8,18 +8,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.arrays import BoolArray, FloatArray
 from fogml.runs.run import Run
+from fogml.runs.settling import error_of_mean, settling_rows
 from fogml.runs.turning import white_noise
 
 LEAST_ROWS = 4
 """Rows that a plateau needs: fewer tell no noise."""
 SETTLING_ROWS = 2
 """Rows left out at the begin of a plateau at least, unless told otherwise: a sample's edge and the loop."""
-SETTLED_SHARE = 1e-8
-"""Share of a step of the rate that settling may still lack: a hundredth of a ppm of the scale factor."""
-PARTS = 16
-"""Parts of a plateau that tell how well its mean is known."""
 LEAST_CYCLES = 3
 """Cycles that make an oscillation."""
 SINE_SHARE = 0.95
@@ -28,8 +25,6 @@ ROUND_OFF_DEG_H = 1e-6
 """Rates that differ by less are the same."""
 _BAND = 0.05
 _SAME_CYCLE = 0.2
-_SETTLING_ERRORS = 4.0
-"""Standard errors beyond which the output has not settled: a bias that drifts meanwhile is hardly beyond."""
 _NOISES = 6.0
 """Steps of the recorded rate beyond so many of its own noise are steps of the table."""
 
@@ -104,7 +99,9 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
         turning[wave.start : wave.stop] = True
     changes = (np.abs(np.diff(rate)) > _NOISES * white_noise(rate[~turning])) | turning[1:] | turning[:-1]
     steps = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(rate)]]).astype(np.intp)
-    settling = _settling_rows(steps, rate, output) if settle_s is None else 0
+    lasting = np.flatnonzero(np.diff(steps[:-1]) >= LEAST_ROWS) + 1
+    starts, heights = steps[lasting], 3600.0 * (rate[steps[lasting]] - rate[steps[lasting] - 1])
+    settling = settling_rows(output, starts, steps[lasting + 1], heights, SETTLING_ROWS)
     rows = []
     for start, stop in zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True):
         settled = start
@@ -130,47 +127,11 @@ def _long_gaps(run: Run, start: int, stop: int) -> list[int]:
     return [int(row) for row in inside[time[inside] - time[inside - 1] > shorter]]
 
 
-def _settling_rows(steps: IndexArray, rate: FloatArray, output: FloatArray) -> int:
-    """Rows after a step of the rate in which the output lacks some of it, by all steps together.
-
-    In octaves of rows: what the output there differs from the plateau's second half, along the step.
-    """
-    settling = first = SETTLING_ROWS
-    while True:
-        last = 2 * first
-        lacked = squares = noise = 0.0
-        for before, start, stop in zip(steps[:-2].tolist(), steps[1:-1].tolist(), steps[2:].tolist()):
-            half = start + (stop - start) // 2
-            if start - before < LEAST_ROWS or start + first + LEAST_ROWS > half:
-                continue
-            step = 3600.0 * float(rate[start] - rate[start - 1])
-            part, settled = output[start + first : min(start + last, half)], output[half:stop]
-            lacked += step * float(part.mean() - settled.mean())
-            squares += step**2
-            error = _error_of_mean(settled) * np.sqrt((stop - half) / len(part))
-            noise += (step * error) ** 2
-        if not squares > 0.0:
-            return settling
-        if abs(lacked) > max(_SETTLING_ERRORS * np.sqrt(noise), SETTLED_SHARE * squares):
-            settling = last
-        first = last
-
-
 def _told(run: Run, output: FloatArray, start: int, stop: int) -> tuple[float, ...]:
     part, rate = output[start:stop], 3600.0 * run.rate[start:stop]
     middle = 0.5 * (run.time[start] + run.time[stop - 1])
     acting = float(rate.mean()) + earth_deg_h(run)
-    return float(middle), acting, float(part.mean()), _error_of_mean(part), _error_of_mean(rate)
-
-
-def _error_of_mean(part: FloatArray) -> float:
-    """Standard error of a mean from differences of neighbouring parts, so that a drift is no noise.
-
-    Of parts and not of rows: rounding to whole counts, which rows hold, averages out sooner than noise.
-    """
-    rows = max(len(part) // PARTS, 1)
-    means = part[len(part) % rows :].reshape(-1, rows).mean(axis=1)
-    return float(np.sqrt(0.5 * np.mean(np.diff(means) ** 2) / len(means)))
+    return float(middle), acting, float(part.mean()), error_of_mean(part), error_of_mean(rate)
 
 
 def merged(values: FloatArray, error: FloatArray) -> FloatArray:

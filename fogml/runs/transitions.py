@@ -9,6 +9,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
+from fogml.runs.settling import LEAST_ROWS, settling_rows
 from fogml.runs.turning import LEAST_RATE_DEG_S, white_noise
 
 MARGIN_BEYOND_S = 2.5
@@ -63,7 +64,8 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
         The run.
     margin_s
         Samples within this time of a change are cut [s]; by default m = t_z + 2.5 s with t_z the
-        table's time to rate, within the source's bounds t_z < m < t_z + 5 s.
+        table's time to rate, within the source's bounds t_z < m < t_z + 5 s; after a change as long as all
+        changes together show that gyro or table have not settled.
 
     Raises
     ------
@@ -79,12 +81,13 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
         raise InputError(
             f"the margin about a change of the table's rate must not be negative, got {margin_s:g} s"
         )
-    starts = _changes(run).start
-    if margin_s is None:
+    starts, settled_s = _changes(run).start, margin_s
+    if margin_s is None or settled_s is None:
         margin_s = time_to_rate_s(run) + MARGIN_BEYOND_S
+        settled_s = _settling_s(run, _changes(run), margin_s)
     time = run.time
     first = np.searchsorted(time, time[starts] - margin_s)
-    last = np.searchsorted(time, time[starts] + margin_s, side="right")
+    last = np.searchsorted(time, time[starts] + settled_s, side="right")
     edges = np.zeros(len(run) + 1, dtype=np.int64)
     np.add.at(edges, np.minimum(first, np.maximum(starts - 1, 0)), 1)
     np.add.at(edges, last, -1)
@@ -180,3 +183,30 @@ def _gyro_settling_s(run: Run, changes: _Changes) -> float:
             last = start + int(np.flatnonzero(away)[-1])
             longest = max(longest, float(run.time[last] - run.time[start]))
     return longest
+
+
+def _settling_s(run: Run, changes: _Changes, least_s: float) -> float:
+    """Time after changes in which all of them together show that gyro or table have not settled [s].
+
+    `least_s` or longer, half of the shortest plateau at most.
+    """
+    if len(changes.start) == 0:
+        return least_s
+    edges = np.concatenate([changes.start, [len(run)]])
+    limits = np.searchsorted(run.time, run.time[changes.start] + LONGEST_TRANSITION_S)
+    stops = np.minimum(edges[1:], limits)
+    first = max(1, round(least_s / run.sample_s))
+    kept = (stops - changes.start >= 4 * first) & (changes.start >= LEAST_ROWS)
+    if not kept.any():
+        return least_s
+    starts, stops = changes.start[kept], stops[kept]
+    series = run.gyro
+    heights = np.array(
+        [
+            float(series[(start + stop) // 2 : stop].mean() - series[start - LEAST_ROWS : start].mean())
+            for start, stop in zip(starts.tolist(), stops.tolist(), strict=True)
+        ]
+    )
+    rows = settling_rows(series, starts, stops, heights, first)
+    longest = 0.5 * float(np.min(run.time[stops - 1] - run.time[starts]))
+    return max(least_s, min(rows * run.sample_s, longest)) if rows > first else least_s
