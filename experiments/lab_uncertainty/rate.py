@@ -75,9 +75,10 @@ CASES = {
 
 @dataclass(frozen=True)
 class Truth:
-    """Scale factor of the line through the rates, and sensitivity [ppm/degC]."""
+    """Scale factor of the line through the rates, asymmetry [ppm] and sensitivity [ppm/degC]."""
 
     scale: float
+    asymmetry: float
     sensitivity: float
 
 
@@ -119,7 +120,7 @@ def recorded(ladder: Ladder, rng: np.random.Generator) -> tuple[Run, Truth]:
     line = np.column_stack([np.ones(len(levels)), levels])
     truth = np.linalg.lstsq(line, output(levels) / 3600.0, rcond=None)[0][1]
     return Run("ladder", {name: part[kept] for name, part in columns.items()}, Facts()), Truth(
-        float(truth), sensitivity
+        float(truth), float(asymmetry), sensitivity
     )
 
 
@@ -128,12 +129,17 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
     ladder = CASES[name]
     quantity = "sensitivity [ppm/degC]" if ladder.soaks else "scale factor"
     told: list[Told | None] = []
+    uneven: list[Told | None] = []
     for repeat in range(repeats):
         run, truth = recorded(ladder, np.random.default_rng([seed, repeat]))
         values = rate_json([run], source="synthetic")
         line, sensed = values["scale_factor"], values["temperature_sensitivity"]
         if not ladder.soaks:
             told.append(of_interval(line["scale_factor"], truth.scale, line["ci90"]))
+            ends = line["asymmetry_ci90_ppm"]
+            if ends is not None:
+                uneven.append(of_interval(line["asymmetry_ppm"], truth.asymmetry, ends))
         elif sensed is not None:
             told.append(of_interval(sensed["ppm_per_degC"], truth.sensitivity, sensed["ci90"]))
-    return [coverage(name, quantity, told)]
+    rows = [coverage(name, quantity, told)]
+    return [*rows, coverage(name, "asymmetry [ppm]", uneven)] if uneven else rows

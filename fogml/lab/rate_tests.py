@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
-from fogml.lab.rate_errors import spread_of
+from fogml.lab.rate_errors import Spread, spread_of
 from fogml.lab.rate_pieces import ROUND_OFF_DEG_H, Plateaus, merged
 from fogml.validation.rate_ladder import LEAST_LEVELS, nonlinearity_ppm
 
@@ -59,12 +59,14 @@ class Line:
     scale_factor, se, ci90
         Output over input, its standard error, and the interval that holds it with 90 %. The rates' scatter
         about the line counts as noise of two parts, one that goes with the rate, such as the table's; so does
-        nonlinearity, which one way through the rates does not tell from it. None where nothing is left over.
+        nonlinearity other than asymmetry, which one way through the rates does not tell from it. None where
+        nothing is left over.
     nonlinearity_ppm
         Greatest deviation of a rate's output from the line over the greatest output; None for fewer than
         four rates.
-    asymmetry_ppm
-        Scale factor of the positive rates less that of the negative ones; None where one sense lacks.
+    asymmetry_ppm, asymmetry_ci90_ppm
+        Scale factor of the positive rates less that of the negative ones, and its 90 % interval; None where
+        one sense lacks.
     """
 
     scale_factor: float
@@ -72,6 +74,7 @@ class Line:
     ci90: tuple[float, float] | None
     nonlinearity_ppm: float | None
     asymmetry_ppm: float | None
+    asymmetry_ci90_ppm: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -167,26 +170,39 @@ def _fit(plateaus: Plateaus) -> tuple[float, float, float]:
 def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
     scale, bias, drift = _fit(plateaus)
     above = plateaus.output - drift * plateaus.time - bias
-    level = _levels(plateaus)
-    count = np.bincount(level)
-    line = np.column_stack([plateaus.rate, np.ones(len(plateaus))])
-    gain, matrix = np.linalg.pinv(line)[0], line
-    if (by_time := _drift_gain(plateaus, level)) is not None:
-        gain = gain - float(gain @ plateaus.time) * by_time
-        matrix = np.column_stack([line, plateaus.time - plateaus.time.mean()])
-    scatter = (np.ones(len(plateaus)), (plateaus.rate / np.abs(plateaus.rate).max()) ** 2)
-    # What the plateaus' own noise makes, or what they scatter by, whichever is more.
-    found = spread_of(gain, matrix, plateaus.output, scatter, least=float(np.mean(plateaus.error**2)))
-    greatest = float(np.abs(plateaus.rate).max())
-    asymmetry, least = None, criteria.small * greatest
-    senses = [plateaus.rate > least, plateaus.rate < -least]
-    if len(count) >= LEAST_LEVELS and all(sense.any() for sense in senses):
-        # The gain of |rate| beside that of the rate is half of the difference of the two senses.
-        both = np.column_stack([plateaus.rate, np.ones(len(plateaus)), np.abs(plateaus.rate)])
-        asymmetry = 2e6 * float(np.linalg.lstsq(both, above, rcond=None)[0][-1]) / scale
-    means = [np.bincount(level, values) / count for values in (plateaus.rate, above)]
-    ends = None if found is None else (scale - found.half_width, scale + found.half_width)
-    return Line(scale, None if found is None else found.se, ends, nonlinearity_ppm(*means), asymmetry)
+    level, rate, constant = _levels(plateaus), plateaus.rate, np.ones(len(plateaus))
+    count, greatest = np.bincount(level), float(np.abs(rate).max())
+    by_time = _drift_gain(plateaus, level)
+    least = criteria.small * greatest
+    two_sided = len(count) >= LEAST_LEVELS and (rate > least).any() and (rate < -least).any()
+    # The gain of |rate| beside that of the rate is half of the difference of the two senses.
+    matrix = np.column_stack([rate, constant, np.abs(rate)] if two_sided else [rate, constant])
+    explained = matrix if by_time is None else np.column_stack([matrix, plateaus.time - plateaus.time.mean()])
+    scatter = (constant, (rate / greatest) ** 2)
+
+    def known(gain: FloatArray) -> Spread | None:
+        """How well a gain of the outputs is known, those of the drift taken off."""
+        if by_time is not None:
+            gain = gain - float(gain @ plateaus.time) * by_time
+        # What the plateaus' own noise makes, or what they scatter by, whichever is more.
+        noise = float(np.mean(plateaus.error**2))
+        return spread_of(gain, explained, plateaus.output, scatter, least=noise)
+
+    asymmetry = asymmetry_half = None
+    if two_sided:
+        gain = 2e6 * np.linalg.pinv(matrix)[-1] / scale
+        asymmetry, told = float(gain @ above), known(gain)
+        asymmetry_half = None if told is None else told.half_width
+    means = [np.bincount(level, values) / count for values in (rate, above)]
+    found = known(np.linalg.pinv(np.column_stack([rate, constant]))[0])
+    return Line(
+        scale,
+        None if found is None else found.se,
+        None if found is None else (scale - found.half_width, scale + found.half_width),
+        nonlinearity_ppm(*means),
+        asymmetry,
+        None if asymmetry_half is None else (asymmetry - asymmetry_half, asymmetry + asymmetry_half),
+    )
 
 
 def near_zero(plateaus: Plateaus, greatest: float, criteria: Criteria) -> Plateaus:

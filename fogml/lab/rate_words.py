@@ -28,7 +28,9 @@ def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
         rows.append(ResultRow("scale factor", f"{line['scale_factor']:.7f}", number(line["se"]), "1", ppm))
         for key, name in (("nonlinearity_ppm", "nonlinearity"), ("asymmetry_ppm", "asymmetry")):
             if line[key] is not None:
-                rows.append(ResultRow(name, number(line[key]), "", "ppm", ""))
+                ends = line["asymmetry_ci90_ppm"] if name == "asymmetry" else None
+                remark = _within(ends, 1.0, "ppm", number).removeprefix(", ")
+                rows.append(ResultRow(name, number(line[key]), "", "ppm", remark))
     held = values["range"]
     if held is not None:
         remark = "all that was tested"

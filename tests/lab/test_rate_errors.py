@@ -62,6 +62,21 @@ def test_errors_of_the_table_are_in_the_interval() -> None:
     assert 0.75 <= np.mean(held) <= 1.0
 
 
+def test_an_asymmetry_is_told_from_none_and_widens_no_scale_factor() -> None:
+    told = []
+    for uneven in (0.0, 40e-6):
+        rng = np.random.default_rng(7)
+        rate = np.repeat(LADDER, 60)
+        gyro = 3600.0 * rate * (SCALE + 0.5 * uneven * np.sign(rate)) + 0.5 * rng.standard_normal(len(rate))
+        columns = {"time": np.arange(len(rate)) * 1.0, "gyro": gyro, "rate": rate}
+        told.append(rate_json([Run("table", columns, Facts())], source="table")["scale_factor"])
+    (low, high), (least, most) = (line["asymmetry_ci90_ppm"] for line in told)
+    assert low < 0.0 < high and 0.0 < least < 40.0 < most < 50.0
+    widths = [line["ci90"][1] - line["ci90"][0] for line in told]
+    assert widths[1] == pytest.approx(widths[0], rel=1e-3)
+    assert told[1]["ci90"][0] < SCALE < told[1]["ci90"][1]
+
+
 def test_counts_leave_a_mean_as_well_known_as_it_is() -> None:
     rng = np.random.default_rng(5)
     rate = np.repeat(LADDER, 2000)
