@@ -188,11 +188,12 @@ def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
         noise = float(np.mean(plateaus.error**2))
         return spread_of(gain, explained, plateaus.output, scatter, least=noise)
 
-    asymmetry = asymmetry_half = None
+    asymmetry, asymmetry_ends = None, None
     if two_sided:
         gain = 2e6 * np.linalg.pinv(matrix)[-1] / scale
         asymmetry, told = float(gain @ above), known(gain)
-        asymmetry_half = None if told is None else told.half_width
+        if told is not None:
+            asymmetry_ends = (asymmetry - told.half_width, asymmetry + told.half_width)
     means = [np.bincount(level, values) / count for values in (rate, above)]
     found = known(np.linalg.pinv(np.column_stack([rate, constant]))[0])
     return Line(
@@ -201,7 +202,7 @@ def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
         None if found is None else (scale - found.half_width, scale + found.half_width),
         nonlinearity_ppm(*means),
         asymmetry,
-        None if asymmetry_half is None else (asymmetry - asymmetry_half, asymmetry + asymmetry_half),
+        asymmetry_ends,
     )
 
 
