@@ -44,7 +44,8 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         100,
         "Cycles of 6 + 5 soaks from −40 to 60 °C; thermometers of 1/16 °C. The truth is of the "
         "temperature at the coil: where the recorded one lags by minutes or is rounded to degrees, "
-        "the coefficient of its rate is another one, and no interval holds that.",
+        "the coefficient of its rate is another one, and no interval holds that. Nor does one that four "
+        "nearly alike thermometers are read with errors, which shows beside a quiet gyro.",
     ),
     (
         "Prediction intervals on another run (`train`)",
