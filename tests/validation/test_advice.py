@@ -13,7 +13,7 @@ from fogml.runs.findings import Finding
 from fogml.validation.advice import Asked, advice_on, coverage, which_to_use
 from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement, RunJudgement
-from tests.report.judgements import judgement
+from tests.report.judgements import FLOOR, judgement
 
 SEEN = Finding("seen_in_training", "holds the same samples as training run a.csv")
 
@@ -66,6 +66,9 @@ def test_nothing_against_is_use() -> None:
         (lambda: one_way("up", "up"), "use_with_care", "trained one way"),
         (lambda: judgement(findings=(SEEN,)), "do_not_use", "not judged on another run"),
         (lambda: judgement(left=3.0), "do_not_use", "worse than none on b.csv"),
+        (lambda: judgement(offset=-2.0), "use_with_care", "the mean of b.csv moved"),
+        (lambda: judgement(left=1.0, offset=-2.0), "do_not_use", "takes away less than the noise on b.csv"),
+        (lambda: judgement(left=3.0, offset=-5.0), "use_with_care", "less steady than without on b.csv"),
         (lambda: judgement(kind="mean", left=1.0), "do_not_use", "takes away less than the noise on b.csv"),
         (lambda: judgement(outside=0.1), "use_with_care", "10% of b.csv is outside of what was trained"),
         (lambda: judgement(outside=0.7), "do_not_use", "70% of b.csv is outside of what was trained"),
@@ -107,6 +110,37 @@ def test_of_two_models_the_one_that_leaves_less_is_named() -> None:
         assert which_to_use(beside(times))[0] is None and advice_on(beside(times)).grade == "use"
         assert which_to_use(beside(times))[1].startswith("Use either")
     assert which_to_use(judgement()) == (None, "")
+
+
+@pytest.mark.parametrize(
+    ("drift", "left", "grade", "brief"),
+    [
+        # Drift of 1.4 times the noise hardly shows beside it: 1.7 times the noise become 1.
+        (1.4, 0.0, "use", "judged on a run it has not seen"),
+        (0.6, 0.0, "use_with_care", "takes away less than the noise on b.csv"),
+        (9.0, 0.95, "use_with_care", "leaves most of it on b.csv"),
+        (9.0, 0.999, "do_not_use", "takes away less than the noise on b.csv"),
+    ],
+)
+def test_what_is_taken_away_is_told_by_squares(drift: float, left: float, grade: str, brief: str) -> None:
+    judged = replace(judgement(), design_index=None, limits=())
+    (run,) = judged.test
+    before, after = (FLOOR * float(np.hypot(1.0, part * drift)) for part in (1.0, left))
+    figures = [replace(run.before, bias=0.0, bias_stability=rms, rms=rms) for rms in (before, after)]
+    series = replace(run.series, lower=np.zeros_like(run.series.time), upper=np.zeros_like(run.series.time))
+    run = replace(run, before=figures[0], after=figures[1], series=series)
+    found = advice_on(replace(judged, test=(run,)))
+    assert (found.grade, found.brief) == (grade, brief)
+
+
+def test_a_shift_of_the_power_on_alone_is_no_fault_of_the_model() -> None:
+    """Shifts of one size either way: what is left within the run is the same, so no verdict is 'do not'."""
+    for offset in (-2.0, -0.02, 0.02, 2.0):
+        judged = replace(judgement(offset=offset), design_index=None, limits=())
+        assert judged.test[0].after.bias_stability == pytest.approx(judgement().test[0].after.bias_stability)
+        assert advice_on(judged).grade != "do_not_use"
+    told = advice_on(replace(judgement(offset=-2.0), design_index=None, limits=())).reasons[0]
+    assert "0.216 deg/h of bias stability become 0.0072" in told and "that power-on shifted it" in told
 
 
 def test_another_unit_needs_care() -> None:
