@@ -74,11 +74,13 @@ def stationarity(stretches: Sequence[FloatArray], sample_s: float) -> Stationari
 def _by_parts(values: FloatArray) -> float:
     """Chance of parts whose means lie as far apart, by one-way analysis of variance, shape (parts, m)."""
     parts, count = values.shape
-    about = values - values.mean()
-    between = count * float(np.sum(about.mean(axis=1) ** 2))
-    within = float(np.sum(about**2)) - between
+    means = values.mean(axis=1, keepdims=True)
+    between = count * float(np.sum((means - means.mean()) ** 2))
+    within = float(np.sum((values - means) ** 2))
     freedom = parts * (count - 1)
-    return variances_sf(between / (parts - 1) / (within / freedom), parts - 1, freedom)
+    return (
+        variances_sf(between / (parts - 1) / (within / freedom), parts - 1, freedom) if within > 0.0 else 0.0
+    )
 
 
 def _squares(stretches: Sequence[FloatArray]) -> FloatArray:

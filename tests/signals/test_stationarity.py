@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import f_oneway
 
-from fogml.signals.stationarity import stationarity
+from fogml.signals.stationarity import _by_parts, stationarity
 
 
 def test_steady_noise_of_any_colour_passes():
@@ -28,3 +29,13 @@ def test_noise_that_grows_is_seen_with_its_size():
 
 def test_too_short_to_tell():
     assert stationarity([np.arange(20.0)], 1.0).tau_s is None
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.5, 3.0])
+def test_the_chance_is_that_of_the_analysis_of_variance(apart):
+    groups = np.random.default_rng(5).normal(size=(4, 8)) + apart * np.arange(4.0)[:, None]
+    assert _by_parts(groups) == pytest.approx(f_oneway(*groups).pvalue, rel=1e-9)
+
+
+def test_parts_without_scatter_of_their_own_are_apart():
+    assert _by_parts(np.repeat([[1.0], [2.0]], 8, axis=1)) == 0.0
