@@ -7,16 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.signals.distributions import students_ppf
+from fogml.signals.distributions import student_ppf, students_ppf
 
 LEVEL = 0.9
+ONE_SIGMA = 0.682689492137
+"""What a standard error on either side of a normal value holds."""
 _RATIOS = np.concatenate(([0.0], 2.0 ** np.arange(-2.0, 13.0)))
 """What the second part's deviation may be of the first's: nothing, or as likely in any octave."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Standard error, and half-width of the 90 % interval, in the values' unit."""
+    """Standard error, and half-width of the 90 % interval, in the values' unit.
+
+    The standard error is that of one ratio whose interval of 68.3 % is as wide as that over all of them: a
+    root mean square would be that of the few large ratios that are hardly likely.
+    """
 
     se: float
     half_width: float
@@ -68,10 +74,13 @@ def spread_of(
     logs[1:] -= np.log(len(_RATIOS) - 1)
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
-    se = float(np.sqrt(weights @ sizes**2))
-    if not se > 0.0:
+    largest = float(sizes.max())
+    if not largest > 0.0:
         return Spread(0.0, 0.0)
-
     # Of a ratio without scatter nothing is off: a scale of 0 has no quantile.
-    scales = np.maximum(sizes, 1e-12 * se)
-    return Spread(se, students_ppf(0.5 * (1.0 + LEVEL), weights, np.zeros(len(sizes)), scales, free))
+    scales = np.maximum(sizes, 1e-12 * largest)
+    middle = np.zeros(len(sizes))
+    inner, outer = (
+        students_ppf(0.5 * (1.0 + level), weights, middle, scales, free) for level in (ONE_SIGMA, LEVEL)
+    )
+    return Spread(inner / float(student_ppf(0.5 * (1.0 + ONE_SIGMA), free)), outer)

@@ -121,3 +121,13 @@ def test_one_known_part_gives_student_s_interval() -> None:
     assert found.se == pytest.approx(wanted)
     assert found.half_width == pytest.approx(student.ppf(0.95, 198) * wanted)
     assert spread_of(gain[:2], line[:2], values[:2], (np.ones(2), np.ones(2))) is None
+
+
+def test_a_standard_error_is_never_wider_than_the_interval_of_90_percent() -> None:
+    """Three values on a line: most of what is left is hardly told, so that large ratios stay likely."""
+    line = np.column_stack([np.ones(4), np.arange(4.0)])
+    gain = np.linalg.pinv(line)[1]
+    for noise in (0.0, 1e-9, 1e-3, 1.0):
+        values = line @ np.array([1.0, 2.0]) + noise * np.random.default_rng(2).standard_normal(4)
+        found = spread_of(gain, line, values, (np.ones(4), np.full(4, 1e6)))
+        assert found is not None and 0.0 <= found.se <= found.half_width
