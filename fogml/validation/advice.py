@@ -29,7 +29,8 @@ class Asked:
         Share of a test run at temperatures and rates that training did not hold, from which on care is
         due: a hundredth, as less is a sample or two at the ends of a range.
     mostly_outside
-        The same from which on the judgement is of another model than the one in use: over half.
+        The same from which on the judgement is of another model than the one in use: over half. Where it
+        does not take away what it should there, it is not to be used.
     beside
         Share of the rms on the worst test run by which a model judged beside has to leave less before it is
         named instead: two fits of one unit differ by as much from run to run.
@@ -229,11 +230,13 @@ def _gained(run: RunJudgement) -> Iterator[Reason]:
 
 
 def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
-    yield from _gained(run)
+    against = list(_gained(run))
+    yield from against
     if run.outside_training > asked.outside:
         mostly = run.outside_training > asked.mostly_outside
         yield Reason(
-            "do_not_use" if mostly else "use_with_care",
+            # What it takes away there all the same, it takes away as it falls back.
+            "do_not_use" if mostly and against else "use_with_care",
             f"{run.outside_training:.0%} of {run.run} is outside of what was trained",
             f"{run.outside_training:.1%} of {run.run} lies at temperatures or rates that training did not "
             "hold: there the model falls back.",

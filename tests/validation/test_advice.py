@@ -71,7 +71,7 @@ def test_nothing_against_is_use() -> None:
         (lambda: judgement(left=3.0, offset=-5.0), "use_with_care", "less steady than without on b.csv"),
         (lambda: judgement(kind="mean", left=1.0), "do_not_use", "takes away less than the noise on b.csv"),
         (lambda: judgement(outside=0.1), "use_with_care", "10% of b.csv is outside of what was trained"),
-        (lambda: judgement(outside=0.7), "do_not_use", "70% of b.csv is outside of what was trained"),
+        (lambda: judgement(outside=0.7), "use_with_care", "70% of b.csv is outside of what was trained"),
         (lambda: judgement(limit=1e-3), "do_not_use", "rms over its limit"),
         (overconfident, "use_with_care", "its interval does not hold on b.csv"),
         (narrow, "do_not_use", "trained at one temperature"),
@@ -131,6 +131,14 @@ def test_what_is_taken_away_is_told_by_squares(drift: float, left: float, grade:
     run = replace(run, before=figures[0], after=figures[1], series=series)
     found = advice_on(replace(judged, test=(run,)))
     assert (found.grade, found.brief) == (grade, brief)
+
+
+def test_a_model_that_is_mostly_outside_and_leaves_most_of_it_is_not_to_be_used() -> None:
+    judged = replace(judgement(left=0.97, outside=0.7), design_index=None, limits=())
+    alone = advice_on(replace(judgement(left=0.97), design_index=None, limits=()))
+    assert (alone.grade, alone.brief) == ("use_with_care", "leaves most of it on b.csv")
+    found = advice_on(judged)
+    assert (found.grade, found.brief) == ("do_not_use", "70% of b.csv is outside of what was trained")
 
 
 def test_a_shift_of_the_power_on_alone_is_no_fault_of_the_model() -> None:
