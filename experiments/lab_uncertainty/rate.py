@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.lab_uncertainty.measure import Told, coverage, of_interval
+from experiments.lab_uncertainty.measure import Told, coverage, of_interval, share
 from experiments.lab_uncertainty.signals import Noise, kept_rows, lagged, thermometer
 from fogml.arrays import FloatArray
 from fogml.lab.rate_json import rate_json
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
+from fogml.validation.rate_ladder import nonlinearity_ppm
 
 TACTICAL, NAVIGATION = Noise(0.02, 0.05, 0.05), Noise(0.001, 0.002, 0.005)
 UP = (0.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -75,10 +76,11 @@ CASES = {
 
 @dataclass(frozen=True)
 class Truth:
-    """Scale factor of the line through the rates, asymmetry [ppm] and sensitivity [ppm/degC]."""
+    """Scale factor of the line through the rates, asymmetry, nonlinearity [ppm], sensitivity [ppm/degC]."""
 
     scale: float
     asymmetry: float
+    nonlinearity: float | None
     sensitivity: float
 
 
@@ -117,10 +119,11 @@ def recorded(ladder: Ladder, rng: np.random.Generator) -> tuple[Run, Truth]:
     if ladder.soaks:
         columns["T"] = thermometer(rng, temperature, step, 120.0, 1.0 / 16.0)
     levels = np.array(ladder.rates)
+    once = np.unique(levels)
     line = np.column_stack([np.ones(len(levels)), levels])
     truth = np.linalg.lstsq(line, output(levels) / 3600.0, rcond=None)[0][1]
     return Run("ladder", {name: part[kept] for name, part in columns.items()}, Facts()), Truth(
-        float(truth), float(asymmetry), sensitivity
+        float(truth), float(asymmetry), nonlinearity_ppm(once, output(once)), sensitivity
     )
 
 
@@ -130,16 +133,22 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
     quantity = "sensitivity [ppm/degC]" if ladder.soaks else "scale factor"
     told: list[Told | None] = []
     uneven: list[Told | None] = []
+    bent, outside = 0, 0
     for repeat in range(repeats):
         run, truth = recorded(ladder, np.random.default_rng([seed, repeat]))
         values = rate_json([run], source="synthetic")
         line, sensed = values["scale_factor"], values["temperature_sensitivity"]
         if not ladder.soaks:
             told.append(of_interval(line["scale_factor"], truth.scale, line["ci90"]))
-            ends = line["asymmetry_ci90_ppm"]
-            if ends is not None:
-                uneven.append(of_interval(line["asymmetry_ppm"], truth.asymmetry, ends))
+            if line["asymmetry_ci90_ppm"] is not None:
+                uneven.append(of_interval(line["asymmetry_ppm"], truth.asymmetry, line["asymmetry_ci90_ppm"]))
+            if truth.nonlinearity is not None and line["nonlinearity_ci90_ppm"] is not None:
+                low, high = line["nonlinearity_ci90_ppm"]
+                bent += 1
+                outside += not low - 1e-3 <= truth.nonlinearity <= high
         elif sensed is not None:
             told.append(of_interval(sensed["ppm_per_degC"], truth.sensitivity, sensed["ci90"]))
     rows = [coverage(name, quantity, told)]
-    return [*rows, coverage(name, "asymmetry [ppm]", uneven)] if uneven else rows
+    if uneven:
+        rows.append(coverage(name, "asymmetry [ppm]", uneven))
+    return [*rows, share(name, "nonlinearity not in its 90 % interval", outside, bent, 0.1)] if bent else rows

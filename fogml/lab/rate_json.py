@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.lab.rate_bend import nonlinearity_within
 from fogml.lab.rate_pieces import Plateaus, find_oscillations, find_plateaus, merged
 from fogml.lab.rate_response import Gain, Slew, bandwidth, gain_of, slew
 from fogml.lab.rate_temperature import by_temperature, temperature_sensitivity
@@ -147,7 +148,7 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
 def _main_ladder(read: _Read, greatest: float, criteria: Criteria) -> tuple[Line, Range] | None:
     """Of the run, and the temperature, with the most different large rates against the greatest of all
     [deg/h]; a scale factor that goes with temperature is no nonlinearity."""
-    best: tuple[Line, Range] | None = None
+    best: tuple[Line, Range, Run, Plateaus] | None = None
     most = 0
     for run, whole in read.ladders:
         for plateaus in by_temperature(run, whole):
@@ -155,8 +156,13 @@ def _main_ladder(read: _Read, greatest: float, criteria: Criteria) -> tuple[Line
             rate = merged(plateaus.rate, plateaus.rate_error)
             levels = len(np.unique(rate[np.abs(rate) >= criteria.small * greatest]))
             if found is not None and levels > most:
-                best, most = found, levels
-    return best
+                best, most = (*found, run, plateaus), levels
+    if best is None:
+        return None
+    line, held, run, plateaus = best
+    followed = plateaus[np.abs(plateaus.rate) <= held.followed]
+    within = nonlinearity_within(run, followed, line.scale_factor)
+    return replace(line, nonlinearity_ci90_ppm=within), held
 
 
 def _small(

@@ -61,9 +61,9 @@ class Line:
         about the line counts as noise of two parts, one that goes with the rate, such as the table's; so does
         nonlinearity other than asymmetry, which one way through the rates does not tell from it. None where
         nothing is left over.
-    nonlinearity_ppm
+    nonlinearity_ppm, nonlinearity_ci90_ppm
         Greatest deviation of a rate's output from the line over the greatest output; None for fewer than
-        four rates.
+        four rates. Its 90 % interval is `fogml.lab.rate_bend.nonlinearity_within`'s, which takes the run.
     asymmetry_ppm, asymmetry_ci90_ppm
         Scale factor of the positive rates less that of the negative ones, and its 90 % interval; None where
         one sense lacks.
@@ -75,6 +75,7 @@ class Line:
     nonlinearity_ppm: float | None
     asymmetry_ppm: float | None
     asymmetry_ci90_ppm: tuple[float, float] | None
+    nonlinearity_ci90_ppm: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

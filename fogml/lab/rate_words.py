@@ -26,11 +26,10 @@ def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
         ppm = f"{1e6 * (line['scale_factor'] - 1.0):+.1f} ppm".replace("-", "\N{MINUS SIGN}")
         ppm += _within(line["ci90"], 1e6, "ppm", number)
         rows.append(ResultRow("scale factor", f"{line['scale_factor']:.7f}", number(line["se"]), "1", ppm))
-        for key, name in (("nonlinearity_ppm", "nonlinearity"), ("asymmetry_ppm", "asymmetry")):
-            if line[key] is not None:
-                ends = line["asymmetry_ci90_ppm"] if name == "asymmetry" else None
-                remark = _within(ends, 1.0, "ppm", number).removeprefix(", ")
-                rows.append(ResultRow(name, number(line[key]), "", "ppm", remark))
+        for name, words in (("nonlinearity", _from_to), ("asymmetry", _plus_minus)):
+            if line[f"{name}_ppm"] is not None:
+                remark = words(line[f"{name}_ci90_ppm"], number)
+                rows.append(ResultRow(name, number(line[f"{name}_ppm"]), "", "ppm", remark))
     held = values["range"]
     if held is not None:
         remark = "all that was tested"
@@ -65,6 +64,18 @@ def _within(ends: Sequence[float] | None, scale: float, unit: str, number: Numbe
     if ends is None:
         return ""
     return f", 90 %: ± {number(0.5 * scale * (ends[1] - ends[0]))} {unit}"
+
+
+def _plus_minus(ends: Sequence[float] | None, number: Number) -> str:
+    return _within(ends, 1.0, "ppm", number).removeprefix(", ")
+
+
+def _from_to(ends: Sequence[float] | None, number: Number) -> str:
+    """``90 %: 12 to 15 ppm``."""
+    if ends is None:
+        return ""
+    told = f"90 %: {number(ends[0])} to {number(ends[1])} ppm"
+    return told if ends[0] > 0.0 else f"{told}; noise alone may make as much"
 
 
 def _response(values: Mapping[str, Any], number: Number) -> list[ResultRow]:

@@ -1,0 +1,63 @@
+"""The interval of a rate ladder's nonlinearity, against normal draws and a gyro whose bend is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.lab.rate_bend import greatest_within
+from fogml.lab.rate_json import rate_json
+from fogml.lab.rate_words import result_rows
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+
+RATES = (0.0, 10.0, -10.0, 25.0, -25.0, 50.0, -50.0, 100.0, -100.0, 0.0)
+
+
+def told(cubic_ppm: float, seed: int, rates=RATES) -> dict:
+    """A ladder of minutes whose output is off by `cubic_ppm` at the greatest rate, cubic in it."""
+    rng = np.random.default_rng(seed)
+    rate = np.repeat(rates, 60)
+    gyro = 3600.0 * rate * (1.0 + 1e-6 * cubic_ppm * (rate / 100.0) ** 2) + rng.normal(0.0, 1.2, len(rate))
+    gyro += np.cumsum(rng.normal(0.0, 0.01, len(rate)))
+    run = Run("ladder", {"time": np.arange(len(rate)) + 1.0, "rate": rate, "gyro": gyro}, Facts())
+    return rate_json([run], source="a ladder")
+
+
+@pytest.mark.parametrize("true", [np.zeros(6), np.array([3.0, 0.0, 0.0, -1.0, 0.0, 0.0])])
+def test_the_greatest_of_correlated_values_is_within(true) -> None:
+    rng = np.random.default_rng(0)
+    mixing = rng.normal(size=(6, 4))
+    errors = np.linalg.norm(mixing, axis=1)
+    held = 0
+    for _ in range(2000):
+        low, high = greatest_within(true + mixing @ rng.normal(size=4), errors)
+        held += low <= np.abs(true).max() <= high
+    assert held / 2000 > 0.9 - 2.0 * np.sqrt(0.09 / 2000)
+
+
+def test_a_bend_is_told_and_a_straight_line_has_none() -> None:
+    levels = np.unique(RATES)
+    output = levels * (1.0 + 20e-6 * (levels / 100.0) ** 2)
+    off = output - np.polyval(np.polyfit(levels, output, 1), levels)
+    bend = 1e6 * np.abs(off).max() / np.abs(output).max()
+    line = told(20.0, 1)["scale_factor"]
+    low, high = line["nonlinearity_ci90_ppm"]
+    assert 0.5 * bend < low <= line["nonlinearity_ppm"] <= high < 2.0 * bend and low <= bend <= high
+    lows = [told(0.0, seed)["scale_factor"]["nonlinearity_ci90_ppm"][0] for seed in range(20)]
+    # Of twenty, more than five beyond a probability of 0.1 each happen once in ninety.
+    assert sum(low > 0.0 for low in lows) <= 5
+
+
+def test_words_say_where_noise_alone_may_make_it() -> None:
+    remarks = {
+        cubic: {row.quantity: row.remark for row in result_rows(told(cubic, 3), lambda x: f"{x:.3g}")}
+        for cubic in (0.0, 20.0)
+    }
+    assert "noise alone may make as much" in remarks[0.0]["nonlinearity"]
+    assert remarks[20.0]["nonlinearity"].startswith("90 %: ") and "noise" not in remarks[20.0]["nonlinearity"]
+
+
+def test_three_rates_tell_none() -> None:
+    line = told(0.0, 0, (0.0, 10.0, -10.0, 0.0))["scale_factor"]
+    assert line["nonlinearity_ppm"] is None and line["nonlinearity_ci90_ppm"] is None
