@@ -20,6 +20,7 @@ SECTIONS = {
     "compensation-peers": ("compensation_peers/results.md", "# Models of others"),
     "compensation-variance": ("compensation_peers/results.md", "## What explains the outcome"),
     "strata": ("strata/results.md", "# `auto` beside a fit"),
+    "verdicts": ("verdicts/results.md", "# Does a verdict hold"),
     "known-floor": ("known_floor/results.md", "# Residual over a known floor"),
     "by-reality": ("gap_blind/results.md", "# The diagnosis by reality"),
     "by-form": ("gap_blind/results.md", "## Single effects by distance of form"),
