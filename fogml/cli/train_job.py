@@ -259,7 +259,8 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
             ("scale_factor_repeatability", spread.scale_factor),
         ):
             if figure is not None:
-                text = f"{number(figure.before)} before, {number(figure.after)} after"
+                ends = " to ".join(map(number, figure.after_ci90))
+                text = f"{number(figure.before)} before, {number(figure.after)} (90 %: {ends}) after"
                 terminal.say(f"{label(name)} {over}: {text} [{unit_of(name)}]")
     stated = [*judgement.limits]
     if judgement.design_index is not None:

@@ -82,7 +82,7 @@ def acceptance_json(
     earth = all(run.earth_known for run in runs)
     notes = [] if earth else ["Earth rate is not known (latitude, input_axis): the bias holds it."]
     notes += [f"{name}: the model was trained on this run" for name in seen]
-    notes += _left_out(errors)
+    notes += _left_out(errors) + _near(rows, limits)
     small = {run.name for run in runs if small_rates(run)}
     if small:
         notes.append(
@@ -140,6 +140,24 @@ def _left_out(errors: Sequence[RunErrors]) -> list[str]:
     ]
 
 
+def _near(rows: Sequence[Mapping[str, Any]], limits: Limits) -> list[str]:
+    """Figures that other runs of the same gyro may bring to the other side of their limit, in one line."""
+    near = []
+    for row in rows:
+        limit, within = limits.by_quantity.get(row["quantity"]), row["ci90"]
+        if limit is None or within is None:
+            continue
+        figure = row["before"] if row["after"] is None else row["after"]
+        if len({limit.holds(value) for value in (figure, *within)}) > 1:
+            near.append(row["name"])
+    if not near:
+        return []
+    return [
+        f"{listed(near, 3)}: the limit lies within the figure's 90 % interval. Figures are compared with "
+        "limits as they are, without a guard band: other runs of this gyro may decide otherwise"
+    ]
+
+
 def _compensated(errors: RunErrors) -> Run:
     """The run as it is after compensation."""
     columns = {**errors.run.columns, "gyro": errors.run.gyro_deg_h - errors.drift}
@@ -159,6 +177,7 @@ def _row(quantity: Any, found: Figure | None, limits: Limits, compensated: bool)
         "before": None if found is None else found.before,
         "after": None if found is None or not compensated else found.after,
         "at_most": found is not None and found.at_most,
+        "ci90": None if found is None or found.ci90 is None else list(found.ci90),
         "of": None if found is None else found.of,
         "remark": f"not tested: needs {quantity.needs}" if found is None else found.remark,
         "limit": None if limit is None else limit.as_json(),

@@ -15,8 +15,9 @@ from fogml.lab.rate_pieces import earth_deg_h, find_plateaus, merged
 from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
 from fogml.runs.turning import least_rate_deg_s, white_noise
+from fogml.validation.certified import of_10_s, over_temperature
 from fogml.validation.metrics import repeatability_of
-from fogml.validation.results import RunJudgement, SoakBias
+from fogml.validation.results import RunJudgement, SoakBias, SpreadOverRuns
 from fogml.validation.soaks import (
     EQUAL_TEMPERATURE_DEGC,
     Soak,
@@ -103,7 +104,8 @@ _MOST_NAMES = 3
 class Figure:
     """What the runs tell of a quantity: before and after compensation, the run it is from, and a remark.
 
-    `at_most` where they tell only that it is no more than that.
+    `at_most` where they tell only that it is no more than that; `ci90` is the 90 % interval of the figure
+    after compensation, where it has one.
     """
 
     before: float
@@ -111,6 +113,7 @@ class Figure:
     of: str
     remark: str = ""
     at_most: bool = False
+    ci90: tuple[float, float] | None = None
 
 
 def figures_of(
@@ -141,19 +144,34 @@ def figures_of(
             sizes = [abs(getattr(one.after, key)) for one in told]
             beyond = [0.0 if limit is None else limit.excess(getattr(one.after, key)) for one in told]
             worst = told[max(range(len(told)), key=lambda place: (beyond[place], sizes[place]))]
-            yield key, Figure(getattr(worst.before, key), getattr(worst.after, key), worst.run)
+            pair = getattr(worst.before, key), getattr(worst.after, key)
+            yield key, Figure(*pair, worst.run, ci90=_within(key, worst))
     for key, pair in soaks_tell(steady).items():
         if all(getattr(one.after, key) is None for one in judged):
             yield key, Figure(*pair, "all runs together")
     spread = repeatability_of(judged)
     if spread is not None:
         over = f"{spread.runs} {'power cycles' if spread.power_cycles else 'runs'}"
-        yield "bias_repeatability", Figure(spread.bias.before, spread.bias.after, over)
+        yield "bias_repeatability", _repeated(spread.bias, over)
         if spread.scale_factor is not None:
-            figure = spread.scale_factor
-            yield "scale_factor_repeatability", Figure(figure.before, figure.after, over)
+            yield "scale_factor_repeatability", _repeated(spread.scale_factor, over)
     yield from _of_rates(before, after)
     yield from _of_noise(before, after, noise)
+
+
+def _within(key: str, run: RunJudgement) -> tuple[float, float] | None:
+    """90 % interval of a run's figure, as its certificate has it."""
+    if key == "scale_factor_error" and run.scale_factor_half_width is not None:
+        middle = run.after.scale_factor_error or 0.0
+        return middle - run.scale_factor_half_width, middle + run.scale_factor_half_width
+    told = {"bias_stability": over_temperature, "bias_stability_10s": of_10_s}
+    found = told[key](run) if key in told else None
+    return None if found is None else found.ci90
+
+
+def _repeated(found: SpreadOverRuns, over: str) -> Figure:
+    low, high = found.after_ci90
+    return Figure(found.before, found.after, over, f"90 % of {low:.3g} to {high:.3g}", ci90=(low, high))
 
 
 def small_rates(run: Run) -> bool:
@@ -211,7 +229,8 @@ def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) ->
         low, high = terms[0]["ci"]
         if all(term["value"] is not None for term in terms):
             remark = f"90 % of {low:.3g} to {high:.3g}"
-            yield key, Figure(terms[0]["value"], terms[1]["value"], pair[0].name, remark)
+            own = tuple(terms[1]["ci"])
+            yield key, Figure(terms[0]["value"], terms[1]["value"], pair[0].name, remark, ci90=own)
         elif all(term["ci"][1] for term in terms):
             remark = "not told from the other terms; upper end of the 90 % interval"
             yield key, Figure(high, terms[1]["ci"][1], pair[0].name, remark, at_most=True)

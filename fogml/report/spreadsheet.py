@@ -165,11 +165,12 @@ def _summary(writer: Writer, judgement: Judgement) -> None:
         found = judgement.repeatability
         figures = [("bias_repeatability", found.bias), ("scale_factor_repeatability", found.scale_factor)]
         spreads = [
-            (label(name), figure.before, figure.after, unit_of(name))
+            (label(name), figure.before, figure.after, unit_of(name), *figure.after_ci90)
             for name, figure in figures
             if figure is not None
         ]
-        row = writer.table(sheet, (repeatability.caption, "before", "after", "unit"), spreads, row) + 1
+        spread_heads = (repeatability.caption, "before", "after", "unit", "after, 90 % from", "to")
+        row = writer.table(sheet, spread_heads, spreads, row) + 1
     outcomes = stated_limits(judgement)
     if outcomes:
         limits = [(label(o.quantity), o.limit, o.value, unit_of(o.quantity), o.met) for o in outcomes]

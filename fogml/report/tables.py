@@ -171,9 +171,18 @@ def repeatability_table(found: Repeatability | None) -> Table | None:
             ("Before", "", "figure"),
             ("After", "", "figure"),
             ("Unit", "", "text"),
+            ("After, 90 %", "", "text"),
         ),
         rows=tuple(
-            Row((label(name), number(figure.before), number(figure.after), unit_of(name)))
+            Row(
+                (
+                    label(name),
+                    number(figure.before),
+                    number(figure.after),
+                    unit_of(name),
+                    " to ".join(map(number, figure.after_ci90)),
+                )
+            )
             for name, figure in told.items()
             if figure is not None
         ),

@@ -41,6 +41,13 @@ def chi2_sf(value: ArrayLike, freedom: ArrayLike) -> Any:
     return chdtrc(freedom, value)
 
 
+def deviation_within(value: float, freedom: float, level: float = 0.9) -> tuple[float, float]:
+    """Interval of a standard deviation that normal values show with so many degrees of freedom."""
+    outside = 0.5 * (1.0 - level)
+    low, high = (value * float(np.sqrt(freedom / chi2_ppf(p, freedom))) for p in (1.0 - outside, outside))
+    return low, high
+
+
 def student_ppf(probability: ArrayLike, freedom: ArrayLike) -> Any:
     """Value under which Student's t lies with a probability between 0 and 1."""
     from scipy.special import stdtrit

@@ -9,10 +9,8 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.signals.averages import freedom_of_deviation
-from fogml.signals.distributions import chi2_ppf
+from fogml.signals.distributions import deviation_within
 from fogml.validation.results import RunJudgement
-
-_COVERAGE = 0.9
 
 
 @dataclass(frozen=True)
@@ -33,13 +31,8 @@ def sample_deviation(values: FloatArray) -> Deviation | None:
     """Of averages [deg/h], shape (n,); None of fewer than three."""
     if len(values) < 3:
         return None
-    return _deviation(float(np.std(values, ddof=1)), len(values), freedom_of_deviation(values))
-
-
-def _deviation(value: float, n: int, freedom: float) -> Deviation:
-    outside = 0.5 * (1.0 - _COVERAGE)
-    low, high = (value * float(np.sqrt(freedom / chi2_ppf(p, freedom))) for p in (1.0 - outside, outside))
-    return Deviation(value, (low, high), n)
+    value = float(np.std(values, ddof=1))
+    return Deviation(value, deviation_within(value, freedom_of_deviation(values)), len(values))
 
 
 def at_constant_temperature(run: RunJudgement) -> FloatArray | None:
@@ -70,7 +63,8 @@ def of_10_s(run: RunJudgement) -> Deviation | None:
     if stability is None or n < 3:
         return None
     # The figures' own is over n.
-    return _deviation(stability * float(np.sqrt(n / (n - 1))), n, run.short_freedom or n - 1.0)
+    value = stability * float(np.sqrt(n / (n - 1)))
+    return Deviation(value, deviation_within(value, run.short_freedom or n - 1.0), n)
 
 
 def set_up(run: RunJudgement) -> dict[str, Any]:

@@ -8,7 +8,7 @@ than 6 do, every run counts, and whether the unit was switched off between them 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,9 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.signals.averages import BlockAverages, block_averages, freedom_of_deviation
+from fogml.signals.distributions import deviation_within
 from fogml.validation.rate_ladder import find_ladder, ladder_figures
-from fogml.validation.results import BeforeAfter, Metrics, Repeatability, RunJudgement, SoakBias
+from fogml.validation.results import Metrics, Repeatability, RunJudgement, SoakBias, SpreadOverRuns
 from fogml.validation.scale_factor import LEAST_SHARE, find_steps, scale_factor_error
 from fogml.validation.soaks import find_soaks, hysteresis, temperature_sensitivity
 
@@ -280,13 +281,21 @@ def repeatability_of(test: Sequence[RunJudgement]) -> Repeatability | None:
     over = cycles if len(cycles) >= LEAST_RUNS else test
     if len(over) < LEAST_RUNS or len({(run.unit, run.axis) for run in over}) > 1:
         return None
-    bias = BeforeAfter(*(_spread([getattr(run, when).bias for run in over]) for when in ("before", "after")))
+    bias = _over_runs([[getattr(run, when).bias for run in over] for when in ("before", "after")], _spread)
     turned = [run for run in over if run.after.scale_factor_error is not None]
     scale = None
     if len(turned) >= LEAST_RUNS:
-        errors = ([getattr(run, when).scale_factor_error for run in turned] for when in ("before", "after"))
-        scale = BeforeAfter(*map(_relative_spread, errors))
+        errors = [[getattr(run, when).scale_factor_error for run in turned] for when in ("before", "after")]
+        scale = _over_runs(errors, _relative_spread)
     return Repeatability(len(over), over is cycles, bias, scale)
+
+
+def _over_runs(
+    values: Sequence[Sequence[float]], spread: Callable[[Sequence[float]], float]
+) -> SpreadOverRuns:
+    before, after = map(spread, values)
+    freedom = len(values[0]) - 1.0
+    return SpreadOverRuns(before, after, deviation_within(before, freedom), deviation_within(after, freedom))
 
 
 def _spread(values: Sequence[float]) -> float:

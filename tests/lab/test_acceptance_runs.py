@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fogml.lab.acceptance import acceptance_json
+from fogml.lab.acceptance_rows import Limit, Limits
 from fogml.lab.rate_json import rate_json
 from fogml.report.acceptance_page import acceptance_page
 from fogml.runs.facts import Facts
@@ -65,6 +66,18 @@ def test_repeatability_is_of_power_cycles_where_runs_say_so(cycle):
         np.std(scale, ddof=1), rel=1e-2
     )
     assert row(values, "bias_repeatability")["of"] == "6 power cycles"
+    # Chi-square of five degrees of freedom lies under 1.1455 and over 11.0705 with 5 % each, by tables.
+    spread = row(values, "bias_repeatability")["before"]
+    ends = [spread * np.sqrt(5.0 / quantile) for quantile in (11.0705, 1.1455)]
+    assert row(values, "bias_repeatability")["ci90"] == pytest.approx(ends, rel=1e-4)
+    for times, near in ((0.5, False), (0.9, True), (1.5, True), (2.5, False)):
+        limits = Limits({"bias_repeatability": Limit(0.0, times * spread)})
+        found = acceptance_json([cycle, *starts], limits=limits)
+        assert row(found, "bias_repeatability")["met"] is (times > 1.0)
+        told = [
+            note for note in found["notes"] if note.startswith("Bias repeatability: the limit lies within")
+        ]
+        assert bool(told) is near
 
 
 def test_sensitivity_is_of_the_run_over_temperature_alone(cycle):

@@ -78,8 +78,11 @@ def test_it_is_written_everywhere_and_may_be_limited(model, tmp_path):
     assert "Bias repeatability" in page and "over 6 power cycles" in page
     spreadsheet(judgement, tmp_path / "report.xlsx")
     cells = list(load_workbook(tmp_path / "report.xlsx")["Summary"].iter_rows(values_only=True))
-    (row,) = [row for row in cells if row[0] == "Bias repeatability" and row[3] == "deg/h" and row[4] is None]
-    assert row[2] == pytest.approx(spread)
+    (row,) = [row for row in cells if row[0] == "Bias repeatability" and len(row) > 5 and row[5] is not None]
+    # Chi-square of five degrees of freedom lies under 1.1455 and over 11.0705 with 5 % each, by tables.
+    ends = [spread * np.sqrt(5.0 / quantile) for quantile in (11.0705, 1.1455)]
+    assert row[2] == pytest.approx(spread) and row[4:6] == pytest.approx(ends, rel=1e-4)
+    assert values["bias"]["after_ci90"] == pytest.approx(ends, rel=1e-4)
 
 
 def test_a_limit_needs_enough_runs(model):
