@@ -11,10 +11,12 @@ from typing import Any
 
 from experiments.lab_uncertainty import (
     certificates,
+    fleets,
     joint,
     models,
     monitor,
     north,
+    planning,
     rate,
     response,
     service,
@@ -48,7 +50,13 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         "Before, a lag of 1 s put the scale factor off by 128 ppm. A threshold is told at two "
         "standard errors.",
     ),
-    ("Deviations on certificates", certificates, 400, "The truth is the mean square over all runs."),
+    (
+        "Deviations on certificates and in acceptance",
+        certificates,
+        400,
+        "The truth is the mean square over all runs. Figures are compared with limits as they are, so that "
+        "noise lets units pass which miss a limit: stated is chi-square's share.",
+    ),
     (
         "Coefficients of drift models (`train`)",
         joint,
@@ -71,6 +79,22 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         200,
         "Figures of a run beyond its model, and the trend over a unit's runs. A run of less than "
         "an hour tells little of its noise. Units that gave an alarm are left out of the trend.",
+    ),
+    (
+        "Promises of a plan (`plan`)",
+        planning,
+        100,
+        "Fits of runs of a programme of 8 h beside the promised standard errors, twin *tactical*. Here "
+        "signals are fogml's: the twin's replay at constants drawn from its priors, under noise in plain "
+        "NumPy. Of a pair as far apart as `plan` takes to be enough the normal distribution has the other "
+        "one fit better in the share stated.",
+    ),
+    (
+        "A next unit drawn to its fleet (`fleet`)",
+        fleets,
+        100,
+        "Coefficients and prediction intervals of the model of a next unit, shared among ten fleets a case; "
+        "units' constants are normal. Units that are left to their own runs are not counted.",
     ),
     (
         "Alarms (`monitor`)",

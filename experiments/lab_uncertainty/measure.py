@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,6 +55,24 @@ def coverage(case: str, quantity: str, told: Iterable[Told | None]) -> dict[str,
         "rms_z": float(np.sqrt(np.mean(z**2))),
         "rms_error": float(np.sqrt(np.mean(error**2))),
         "median_se": float(np.median(half)) / Z90,
+    }
+
+
+def of_runs(case: str, quantity: str, shares: Sequence[float]) -> dict[str, Any]:
+    """The row of shares of runs' averages, which are not independent: runs are what is counted."""
+    held = float(np.mean(shares))
+    error = 1.96 * float(np.std(shares, ddof=1)) / np.sqrt(len(shares))
+    return {
+        "case": case,
+        "quantity": quantity,
+        "runs": len(shares),
+        "stated": len(shares),
+        "held": held,
+        "wilson95": (held - float(error), min(held + float(error), 1.0)),
+        "mean_z": None,
+        "rms_z": None,
+        "rms_error": None,
+        "median_se": None,
     }
 
 

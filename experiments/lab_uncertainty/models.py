@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from experiments.lab_uncertainty.measure import of_runs
 from experiments.lab_uncertainty.signals import Noise, lagged, thermometer
+from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
@@ -67,27 +69,15 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
         size = np.array([0.3, 0.2, 0.1, 0.3, 0.1]) * rng.standard_normal(5)
         runs = [recorded(case, size, rng, number) for number in range(case.runs + 1)]
         model = make_model(case.model).fit(runs[:-1])
-        test = runs[-1]
-        found = model.evaluate(test)
-        rows = len(test) // 10 * 10
-        left = (test.error_deg_h - found.drift)[:rows].reshape(-1, 10).mean(axis=1)
-        half = model.intervals_.half_width(0.9, found.excess)[:rows].reshape(-1, 10).mean(axis=1)
-        whole = found.full[:rows].reshape(-1, 10).all(axis=1)
-        shares.append(float(np.mean(np.abs(left[whole]) <= half[whole])))
-    # A run's averages are not independent: runs are what is counted.
-    held = float(np.mean(shares))
-    error = 1.96 * float(np.std(shares, ddof=1)) / np.sqrt(repeats)
-    return [
-        {
-            "case": name,
-            "quantity": "averages over 100 s on another run",
-            "runs": repeats,
-            "stated": repeats,
-            "held": held,
-            "wilson95": (held - float(error), min(held + float(error), 1.0)),
-            "mean_z": None,
-            "rms_z": None,
-            "rms_error": None,
-            "median_se": None,
-        }
-    ]
+        shares.append(share_within(model, runs[-1]))
+    return [of_runs(name, "averages over 100 s on another run", shares)]
+
+
+def share_within(model: DriftModel, test: Run) -> float:
+    """Share of a run's averages over ten rows that lie within their 90 % intervals."""
+    found = model.evaluate(test)
+    rows = len(test) // 10 * 10
+    left = (test.error_deg_h - found.drift)[:rows].reshape(-1, 10).mean(axis=1)
+    half = model.intervals_.half_width(0.9, found.excess)[:rows].reshape(-1, 10).mean(axis=1)
+    whole = found.full[:rows].reshape(-1, 10).all(axis=1)
+    return float(np.mean(np.abs(left[whole]) <= half[whole]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.lab_uncertainty import __main__ as lab_uncertainty
-from experiments.lab_uncertainty import north, rate
+from experiments.lab_uncertainty import certificates, north, planning, rate
 from experiments.lab_uncertainty.measure import Told, coverage, wilson
 from experiments.lab_uncertainty.signals import Noise, flicker, lagged
 
@@ -43,11 +43,22 @@ def test_shares_and_their_intervals() -> None:
 
 
 @pytest.mark.parametrize(
-    ("part", "case"), [(north, "navigation grade, strong drift"), (rate, "table's rates off by 5 ppm")]
+    ("part", "case"),
+    [
+        (north, "navigation grade, strong drift"),
+        (rate, "table's rates off by 5 ppm"),
+        (certificates, "6 runs"),
+    ],
 )
 def test_intervals_hold(part, case: str) -> None:
     row, *_ = part.measured(case, 40, 3)
     assert row["held"] >= 0.75 and row["wilson95"][1] > 0.9
+
+
+def test_fits_of_a_planned_run_scatter_as_promised() -> None:
+    k1, *_ = planning.measured("constants", 12, 3)
+    # Of twelve normal errors the rms lies within these but once in a thousand.
+    assert k1["quantity"] == "k1" and 0.4 < k1["rms_z"] < 1.7
 
 
 def test_the_page_tells_every_row() -> None:
