@@ -36,7 +36,7 @@ def test_whitening_is_the_inverse_cholesky_factor(times, which):
     whitener = Whitener(model, time)
     covariance = model.covariance(time, whitener.averaging_s[0], whitener.ladder)
     lower = np.linalg.cholesky(covariance)
-    values = RNG.normal(size=(len(time), 3))
+    values = np.random.default_rng(6).normal(size=(len(time), 3))
     wanted = np.linalg.solve(lower, values)
     np.testing.assert_allclose(whitener.whiten(values), wanted, rtol=0, atol=1e-6 * np.abs(wanted).max())
     np.testing.assert_allclose(whitener.whiten(values[:, 0]), wanted[:, 0], atol=1e-6 * np.abs(wanted).max())
@@ -48,7 +48,8 @@ def test_whitening_is_the_inverse_cholesky_factor(times, which):
 
 def test_averaging_times_of_their_own():
     """Averages of one, two and four samples are whitened as the averages that they are."""
-    counts = RNG.choice([1, 2, 4], 60)
+    rng = np.random.default_rng(7)
+    counts = rng.choice([1, 2, 4], 60)
     edges = np.concatenate(([0], np.cumsum(counts)))
     model, fine = NoiseModel(N=0.003, B=0.05, K=0.4), np.arange(1.0, edges[-1] + 1)
     whitener = Whitener(model, edges[1:], counts.astype(float))
@@ -56,7 +57,7 @@ def test_averaging_times_of_their_own():
     for i, (a, b) in enumerate(pairwise(edges)):
         mean[i, a:b] = 1 / (b - a)
     covariance = mean @ model.covariance(fine, 1.0, whitener.ladder) @ mean.T
-    values = RNG.normal(size=60)
+    values = rng.normal(size=60)
     wanted = np.linalg.solve(np.linalg.cholesky(covariance), values)
     np.testing.assert_allclose(whitener.whiten(values), wanted, rtol=1e-6, atol=1e-8)
 
@@ -99,7 +100,7 @@ def test_linear_column_by_column_and_block_by_block(seed, columns, scale, cut):
 
 def test_what_came_after_does_not_count():
     time = TIMES["gaps"]
-    values = RNG.normal(size=len(time))
+    values = np.random.default_rng(9).normal(size=len(time))
     whole = Whitener(MODELS["all"], time)
     part = Whitener(MODELS["all"], time[:120], 1.0, whole.ladder)
     np.testing.assert_array_equal(whole.whiten(values)[:120], part.whiten(values[:120]))
