@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -37,8 +38,8 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
     if home.exists() and not home.is_dir():
         raise InputError(f"{home}: is a file, a folder was expected; choose another --out")
     records = _records(settings, terminal)
-    store = open_store(settings.store or str(home / "store"), settings.patience)
-    with terminal.work("keeping runs"):
+    place = settings.store or str(home / "store")
+    with closing(open_store(place, settings.patience)) as store, terminal.work("keeping runs"):
         added = store.add(records) if records else 0
         held = store.records()
     if not held:

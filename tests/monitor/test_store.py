@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -62,31 +63,38 @@ def same(found, expected):
 @pytest.mark.parametrize("kind", [0, 1])
 def test_records_come_back_as_they_were_and_once(tmp_path, kind):
     place = places(tmp_path)[kind]
-    store = open_store(place)
-    assert store.records() == []
-    assert store.add(others(5)) == 5
-    assert store.add([*others(7), *others(7)]) == 2
-    same(open_store(place).records(), others(7))
-    store.close()
+    with closing(open_store(place)) as store:
+        assert store.records() == []
+        assert store.add(others(5)) == 5
+        assert store.add([*others(7), *others(7)]) == 2
+    with closing(open_store(place)) as store:
+        same(store.records(), others(7))
 
 
 @pytest.mark.parametrize("kind", [0, 1])
 def test_many_stations_write_at_once(tmp_path, kind):
     place = places(tmp_path)[kind]
-    open_store(place).add(others(1))
-    stations = [others(10)[start : start + 5] for start in (0, 2, 5)]
+
+    def write(some):
+        with closing(open_store(place, 30.0)) as store:
+            store.add(some)
+
+    write(others(1))
     with ThreadPoolExecutor(3) as pool:
-        list(pool.map(lambda some: open_store(place, 30.0).add(some), stations))
-    same(open_store(place).records(), others(10))
+        list(pool.map(write, [others(10)[start : start + 5] for start in (0, 2, 5)]))
+    with closing(open_store(place)) as store:
+        same(store.records(), others(10))
 
 
 @pytest.mark.parametrize("kind", [0, 1])
 def test_a_store_holds_the_runs_of_years(tmp_path, kind):
     """Every run has a key and a name of its own: more than a run file may have different marks."""
     place = places(tmp_path)[kind]
-    assert open_store(place).add(others(12_000)) == 12_000
-    assert open_store(place).add([*others(1), replace(RECORD, key="b" * 64)]) == 1
-    assert len(open_store(place).records()) == 12_001
+    for records, added in ((others(12_000), 12_000), ([*others(1), replace(RECORD, key="b" * 64)], 1)):
+        with closing(open_store(place)) as store:
+            assert store.add(records) == added
+    with closing(open_store(place)) as store:
+        assert len(store.records()) == 12_001
 
 
 def test_a_database_of_several_stations(database):  # noqa: F811
