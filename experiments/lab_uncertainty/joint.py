@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from experiments.lab_uncertainty.measure import Told, coverage, of_errors
-from experiments.lab_uncertainty.signals import Noise, kept_rows, thermometer
+from experiments.lab_uncertainty.signals import NAVIGATION, TACTICAL, Noise, kept_rows, thermometer
 from fogml.arrays import FloatArray
 from fogml.models.names import make_model
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 
-TACTICAL, NAVIGATION = Noise(0.02, 0.05, 0.05), Noise(0.001, 0.002, 0.005)
 STEPS = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
 
 

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from experiments.lab_uncertainty.measure import Told, coverage, of_interval, share
-from experiments.lab_uncertainty.signals import Noise, kept_rows, lagged, thermometer
+from experiments.lab_uncertainty.signals import NAVIGATION, TACTICAL, Noise, kept_rows, lagged, thermometer
 from fogml.arrays import FloatArray
 from fogml.lab.rate_json import rate_json
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.validation.rate_ladder import nonlinearity_ppm
 
-TACTICAL, NAVIGATION = Noise(0.02, 0.05, 0.05), Noise(0.001, 0.002, 0.005)
 UP = (0.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 BOTH = tuple(sign * rate for rate in UP[1:] for sign in (1.0, -1.0))
 

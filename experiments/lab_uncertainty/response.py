@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 
 from experiments.lab_uncertainty.measure import Told, coverage, of_errors, share
-from experiments.lab_uncertainty.signals import Noise, lagged
+from experiments.lab_uncertainty.signals import NAVIGATION, TACTICAL, Noise, lagged
 from fogml.arrays import FloatArray
 from fogml.lab.rate_json import rate_json
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.validation.scale_factor import find_steps, scale_factor_error
-
-TACTICAL, NAVIGATION = Noise(0.02, 0.05, 0.05), Noise(0.001, 0.002, 0.005)
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from experiments.lab_uncertainty.measure import Told, coverage, of_errors, of_interval, share
-from experiments.lab_uncertainty.signals import Noise, flicker, kept_rows, thermometer
+from experiments.lab_uncertainty.signals import NAVIGATION, TACTICAL, Noise, flicker, kept_rows, thermometer
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.monitor.record import TEXTS, RunRecord, record_run
 from fogml.monitor.watch import watch
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-
-TACTICAL, NAVIGATION = Noise(0.02, 0.05, 0.05), Noise(0.001, 0.002, 0.005)
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,9 @@ class Noise:
         return np.asarray(np.diff(np.floor(angle / self.count_arcsec)) * self.count_arcsec / step_s)
 
 
+TACTICAL, NAVIGATION = Noise(0.02, 0.05, 0.05), Noise(0.001, 0.002, 0.005)
+
+
 def flicker(rng: np.random.Generator, count: int) -> FloatArray:
     """Noise of one-sided density 1 / (pi f), shape (count,): Allan deviation sqrt(2 ln 2 / pi)."""
     period = 1 << int(np.ceil(np.log2(_PERIODS * count)))

@@ -17,14 +17,11 @@ from fogml.lab.north import (
     horizontal_rate,
 )
 from fogml.models.linear import LinearRegressor
-from fogml.models.row_noise import noise_covariance
+from fogml.models.row_noise import MEANS_A_STAY, noise_covariance
 from fogml.models.table import RunRows
 from fogml.runs.run import Run
 
 METHODS = ("auto", "plain", "drift-observing")
-ROWS_A_STAY = 32
-"""Means over a stay that its noise is told from: enough for its slope over frequency, few enough that
-rounding to counts has averaged out."""
 
 
 @dataclass(frozen=True)
@@ -253,7 +250,7 @@ def _fitted(stays: _Stays, design: FloatArray, observes_drift: bool) -> tuple[Fl
     solved = _solved(stays, design, stays.gyro - level, observes_drift)
     rows = RunRows(_columns(stays, design, observes_drift), stays.gyro - level, stays.time)
     step_s = float(np.median(np.diff(stays.time))) if len(stays.time) > 1 else 0.0
-    averaging_s = float(np.median(stays.lengths_s)) / ROWS_A_STAY
+    averaging_s = float(np.median(stays.lengths_s)) / MEANS_A_STAY
     covariance = noise_covariance(
         [rows], lambda columns: columns, solved, averaging_s if averaging_s > step_s else 0.0
     )

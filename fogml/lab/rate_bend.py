@@ -8,15 +8,12 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.lab.rate_errors import LEVEL
 from fogml.lab.rate_pieces import Plateaus, merged
 from fogml.models.linear import LinearRegressor
-from fogml.models.row_noise import noise_covariance
+from fogml.models.row_noise import MEANS_A_STAY, noise_covariance
 from fogml.models.table import RunRows
 from fogml.runs.run import Run
+from fogml.signals.averages import window_means
 from fogml.signals.distributions import normal_ppf
 from fogml.validation.rate_ladder import LEAST_LEVELS
-
-MEANS_A_PLATEAU = 32
-"""Means over a plateau that the noise is told from: enough for its slope over frequency, few enough that
-rounding to counts has averaged out."""
 
 
 def nonlinearity_within(run: Run, plateaus: Plateaus, scale_factor: float) -> tuple[float, float] | None:
@@ -75,8 +72,9 @@ def greatest_within(values: FloatArray, errors: FloatArray) -> tuple[float, floa
 
 def _means(run: Run, plateaus: Plateaus) -> tuple[FloatArray, FloatArray, IndexArray]:
     """Times [s] and outputs [deg/h] of means over equal parts of plateaus, and whose each is."""
-    rows = max(int(np.median(plateaus.stop - plateaus.start)) // MEANS_A_PLATEAU, 1)
+    rows = max(int(np.median(plateaus.stop - plateaus.start)) // MEANS_A_STAY, 1)
     starts = [np.arange(a, b - rows + 1, rows) for a, b in zip(plateaus.start, plateaus.stop, strict=True)]
     of = np.repeat(np.arange(len(plateaus)), [len(part) for part in starts])
-    inside = np.concatenate(starts)[:, None] + np.arange(rows)
-    return run.time[inside].mean(axis=1), run.gyro_deg_h[inside].mean(axis=1), of
+    first = np.concatenate(starts)
+    time, output = (window_means(values, first, first + rows) for values in (run.time, run.gyro_deg_h))
+    return time, output, of

@@ -10,11 +10,9 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.runs.run import Run
-from fogml.runs.settling import error_of_mean, settling_rows
+from fogml.runs.settling import LEAST_ROWS, error_of_mean, settling_rows
 from fogml.runs.turning import white_noise
 
-LEAST_ROWS = 4
-"""Rows that a plateau needs: fewer tell no noise."""
 SETTLING_ROWS = 2
 """Rows left out at the begin of a plateau at least, unless told otherwise: a sample's edge and the loop."""
 LEAST_CYCLES = 3

@@ -173,6 +173,9 @@ def shape_models() -> Sequence[NoiseModel]:
     return NoiseModel(white), NoiseModel(white, B=1.0), NoiseModel(white, K=60.0)
 
 
+MEANS_A_STAY = 32
+"""Means over a stay or a plateau that its noise is told from: enough for its slope over frequency, few enough
+that rounding to counts has averaged out."""
 ROWS = 8192
 """Rows of all runs that the noise is told from and the columns are looked at."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
@@ -37,28 +39,56 @@ def settling_rows(
     first
         Row that the search begins with.
     """
+    plateaus = [
+        _settled(output, start, stop, height)
+        for start, stop, height in zip(starts.tolist(), stops.tolist(), heights.tolist(), strict=True)
+        if start + first + LEAST_ROWS <= start + (stop - start) // 2
+    ]
     settling = first
     while True:
         last = max(first + LEAST_ROWS, round(_GROWTH * first))
         lacked = squares = noise = 0.0
-        for start, stop, height in zip(starts.tolist(), stops.tolist(), heights.tolist(), strict=True):
-            half = start + (stop - start) // 2
+        for start, half, height, count, mean, slope, spread, one in plateaus:
             if start + first + LEAST_ROWS > half:
                 continue
-            part, settled = output[start + first : min(start + last, half)], output[half:stop]
-            rows = np.arange(len(settled)) - 0.5 * (len(settled) - 1)
-            slope = float(rows @ settled) / float(rows @ rows)
-            away = first + 0.5 * (len(part) - 1) - (half - start) - 0.5 * (len(settled) - 1)
-            lacked += height * float(part.mean() - settled.mean() - slope * away)
+            part = output[start + first : min(start + last, half)]
+            away = first + 0.5 * (len(part) - 1) - (half - start) - 0.5 * (count - 1)
+            lacked += height * float(part.mean() - mean - slope * away)
             squares += height**2
-            one = error_of_mean(settled) ** 2 * len(settled)
-            noise += height**2 * one * (1 / len(part) + 1 / len(settled) + away**2 / float(rows @ rows))
+            noise += height**2 * one * (1 / len(part) + 1 / count + away**2 / spread)
         if not squares > 0.0:
             return settling
         if abs(lacked) > max(_ERRORS * np.sqrt(noise), SETTLED_SHARE * squares):
             # One window more: what is left goes on to fall where noise hides it.
             settling = round(_GROWTH * last)
         first = last
+
+
+class _Settled(NamedTuple):
+    """A plateau: first row, the row that its second half begins with, the step before it, and of that half.
+
+    Rows, mean, slope a row, the sum of squares of the rows about their middle, and the variance of one.
+    """
+
+    start: int
+    half: int
+    height: float
+    rows: int
+    mean: float
+    slope: float
+    spread: float
+    variance: float
+
+
+def _settled(output: FloatArray, start: int, stop: int, height: float) -> _Settled:
+    half = start + (stop - start) // 2
+    settled = output[half:stop]
+    count = len(settled)
+    rows = np.arange(count) - 0.5 * (count - 1)
+    spread = float(rows @ rows)
+    slope = float(rows @ settled) / spread
+    variance = error_of_mean(settled) ** 2 * count
+    return _Settled(start, half, height, count, float(settled.mean()), slope, spread, variance)
 
 
 def error_of_mean(part: FloatArray) -> float:

@@ -81,11 +81,12 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
         raise InputError(
             f"the margin about a change of the table's rate must not be negative, got {margin_s:g} s"
         )
-    starts, settled_s = _changes(run).start, margin_s
+    changes, time = _changes(run), run.time
+    settled_s = margin_s
     if margin_s is None or settled_s is None:
         margin_s = time_to_rate_s(run) + MARGIN_BEYOND_S
-        settled_s = _settling_s(run, _changes(run), margin_s)
-    time = run.time
+        settled_s = _settling_s(run, changes, margin_s)
+    starts = changes.start
     first = np.searchsorted(time, time[starts] - margin_s)
     last = np.searchsorted(time, time[starts] + settled_s, side="right")
     edges = np.zeros(len(run) + 1, dtype=np.int64)

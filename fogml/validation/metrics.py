@@ -194,9 +194,7 @@ class RunMetrics:
     @property
     def short_averages(self) -> int:
         """How many averages over 10 s there are; 0 where samples are too far apart."""
-        if self.run.sample_s > SHORT_AVERAGING_S / 2.0:
-            return 0
-        return len(self.averages(self._time, window_s=SHORT_AVERAGING_S))
+        return len(self._short(self._time))
 
     def scale_factor_spread(self, error_deg_h: FloatArray) -> tuple[float | None, float | None]:
         """Standard error and 90 % half-width of the scale factor error of an error series [ppm]."""
@@ -207,10 +205,8 @@ class RunMetrics:
 
     def short_freedom(self, error_deg_h: FloatArray) -> float:
         """Degrees of freedom of the bias stability at 10 s; 0 where there is none."""
-        if not self.short_averages:
-            return 0.0
-        averages = self.averages(error_deg_h[self.used], window_s=SHORT_AVERAGING_S)
-        return freedom_of_deviation(averages.values[0])
+        averages = self._short(error_deg_h[self.used])
+        return freedom_of_deviation(averages) if len(averages) else 0.0
 
     def averages(self, *columns: FloatArray, window_s: float | None = None) -> BlockAverages:
         """Averages over the averaging time of columns that hold the used rows only."""
@@ -261,11 +257,15 @@ class RunMetrics:
         (values,) = averages.values
         return turn_on_time(averages.time_s, values, powered_on, self._turn_on_band, self.averaging_s)
 
-    def _short_stability(self, error: FloatArray) -> float | None:
-        """Bias stability at 10 s, where a window holds at least two samples and lasts no longer."""
+    def _short(self, values: FloatArray) -> FloatArray:
+        """Averages over 10 s of used rows; none where that holds fewer than two samples."""
         if self.run.sample_s > SHORT_AVERAGING_S / 2.0:
-            return None
-        averages = self.averages(error, window_s=SHORT_AVERAGING_S).values[0]
+            return np.empty(0)
+        return self.averages(values, window_s=SHORT_AVERAGING_S).values[0]
+
+    def _short_stability(self, error: FloatArray) -> float | None:
+        """Bias stability at 10 s; None where fewer than two averages tell it."""
+        averages = self._short(error)
         return figures_of_averages(averages).bias_stability if len(averages) > 1 else None
 
 
