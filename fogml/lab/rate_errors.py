@@ -8,6 +8,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.signals.distributions import student_ppf, students_ppf
+from fogml.signals.restricted import absent_or_not, weighed_models
 
 LEVEL = 0.9
 ONE_SIGMA = 0.682689492137
@@ -48,7 +49,7 @@ def spread_of(
     gain
         What the values are multiplied with, shape (n,).
     matrix
-        Columns that explain the values, shape (n, k).
+        Independent columns that explain the values, shape (n, k).
     values
         Values, shape (n,).
     parts
@@ -58,22 +59,19 @@ def spread_of(
     least
         Least variance s**2.
     """
-    free = len(values) - np.linalg.matrix_rank(matrix) + freedom
-    if free < 1:
+    if len(values) + freedom <= matrix.shape[1]:
         return None
-    logs, sizes = np.empty(len(_RATIOS)), np.empty(len(_RATIOS))
-    for place, ratio in enumerate(_RATIOS):
-        variance = parts[0] + ratio**2 * parts[1]
-        q, r = np.linalg.qr(matrix / np.sqrt(variance)[:, None])
-        white = values / np.sqrt(variance)
-        left = white - q @ (q.T @ white)
-        s2 = max((float(left @ left) + squares) / free, least, 1e-300)
-        logs[place] = -0.5 * (np.log(variance).sum() + free * np.log(s2))
-        logs[place] -= float(np.log(np.abs(np.diag(r))).sum())
-        sizes[place] = np.sqrt(s2 * (variance @ gain**2))
-    logs[1:] -= np.log(len(_RATIOS) - 1)
-    weights = np.exp(logs - logs.max())
-    weights /= weights.sum()
+    covariances = parts[0] + _RATIOS[:, None] ** 2 * parts[1]
+    models = weighed_models(
+        covariances,
+        matrix,
+        values,
+        absent_or_not(_RATIOS[:, None]),
+        squares=squares,
+        freedom=freedom,
+        least=least,
+    )
+    sizes = np.sqrt(models.variances * (covariances @ gain**2))
     largest = float(sizes.max())
     if not largest > 0.0:
         return Spread(0.0, 0.0)
@@ -81,6 +79,7 @@ def spread_of(
     scales = np.maximum(sizes, 1e-12 * largest)
     middle = np.zeros(len(sizes))
     inner, outer = (
-        students_ppf(0.5 * (1.0 + level), weights, middle, scales, free) for level in (ONE_SIGMA, LEVEL)
+        students_ppf(0.5 * (1.0 + level), models.weights, middle, scales, models.freedom)
+        for level in (ONE_SIGMA, LEVEL)
     )
-    return Spread(inner / float(student_ppf(0.5 * (1.0 + ONE_SIGMA), free)), outer)
+    return Spread(inner / float(student_ppf(0.5 * (1.0 + ONE_SIGMA), models.freedom)), outer)

@@ -1,8 +1,7 @@
 """The noise of a model's rows, as told by what its columns leave of them.
 
-A grid of models, white noise with flicker and a random walk, weighed by their restricted likelihood, in
-which what the coefficients absorb is accounted for (H. Patterson & R. Thompson, Biometrika 58 (1971) 545).
-A short run tells little of slow noise; so nothing is chosen, all models that count are averaged over.
+A grid of models, white noise with flicker and a random walk, weighed by restricted likelihood
+(`fogml.signals.restricted`): a short run tells little of slow noise, so all that count are averaged over.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from fogml.processes import one_thread
 from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
+from fogml.signals.restricted import absent_or_not, weighed_models
 from fogml.signals.spectrum_terms import SpectrumTerms, term_shapes
 from fogml.signals.whitening import Whitener
 
@@ -33,12 +33,10 @@ noise stays white, and slow noise is sped up by this share."""
 _FEWEST = 8
 """Degrees of freedom that columns must leave for a noise to be told."""
 _LIGHT = 1e-4
-"""Weight below which a model no longer counts."""
+"""Weight, in the greatest, below which a model no longer counts."""
 SLOWEST_CORNER_HZ = 1e-5
 """Lowest frequency, a day's, at which flicker or walk may equal the white noise, however short the rows are:
 of a gyro it is between 1e-5 and 1e-2 Hz, and minutes of rows are white as a rule."""
-_AT_ONCE = 16
-"""Models weighed together."""
 _OCTAVES_BEYOND = 2
 """Octaves above the highest frequency at which flicker or walk may still equal the white noise."""
 
@@ -129,42 +127,31 @@ def noise_of_rows(table: TrainingTable) -> RowNoise | None:
     flicker = np.concatenate(([0.0], 2.0 * np.pi * corners))
     walk = np.concatenate(([0.0], 4.0 * np.pi**2 * corners**2))
     ratios = np.array([(1.0, b, k) for b in flicker for k in walk])
-    beforehand = -np.log(len(corners)) * np.count_nonzero(ratios[:, 1:], axis=1)
-    return _weighed(spectrum, ratios, beforehand)
+    return _weighed(spectrum, ratios)
 
 
-def _weighed(spectrum: Spectrum, ratios: FloatArray, beforehand: FloatArray) -> RowNoise | None:
-    """Models of squares in given ratios by their restricted likelihood, the scale integrated out.
-
-    `beforehand` are logarithms of their prior probabilities.
-    """
+def _weighed(spectrum: Spectrum, ratios: FloatArray) -> RowNoise | None:
+    """Models of squares in given ratios, whose scale is unknown."""
     shapes = term_shapes(spectrum.frequency_hz, spectrum.sample_s, SpectrumTerms(("N", "B", "K")))
     shapes = shapes.mean(axis=1)
     single = len(spectrum.values)
     basis, _ = spectrum.basis
-    freedom = float(spectrum.count.sum()) - basis.shape[1]
-    if freedom < _FEWEST:
+    if float(spectrum.count.sum()) - basis.shape[1] < _FEWEST:
         return None
-    likelihood, squares = np.empty(len(ratios)), np.empty(len(ratios))
-    for first in range(0, len(ratios), _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        density = ratios[some] @ shapes.T
-        weight = 1.0 / density[:, :single]
-        weighed = basis.T * weight[:, None, :]
-        root = np.linalg.cholesky(weighed @ basis)
-        along = np.linalg.solve(root, (weighed @ spectrum.values)[..., None])
-        square = weight @ spectrum.values**2 - np.sum(along**2, axis=(1, 2))
-        square += (1.0 / density[:, single:]) @ (spectrum.count[single:] * spectrum.power[single:])
-        squares[some] = np.maximum(square, 1e-300) / freedom
-        logarithms = np.log(density) @ spectrum.count
-        logarithms += 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-        likelihood[some] = -0.5 * (logarithms + freedom * np.log(squares[some]))
-    likelihood += beforehand
-    weights = np.exp(likelihood - likelihood.max())
-    live = weights > _LIGHT
-    return RowNoise(
-        ratios[live] * squares[live, None], weights[live] / weights[live].sum(), freedom, spectrum.sample_s
+    density = ratios @ shapes.T
+    rest, count = density[:, single:], spectrum.count[single:]
+    models = weighed_models(
+        density[:, :single],
+        basis,
+        spectrum.values,
+        absent_or_not(ratios[:, 1:]),
+        squares=(1.0 / rest) @ (count * spectrum.power[single:]),
+        log_determinants=np.log(rest) @ count,
+        freedom=float(count.sum()),
     )
+    live = models.weights > _LIGHT * models.weights.max()
+    weights = models.weights[live] / models.weights[live].sum()
+    return RowNoise(ratios[live] * models.variances[live, None], weights, models.freedom, spectrum.sample_s)
 
 
 def shape_models() -> Sequence[NoiseModel]:

@@ -9,6 +9,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.monitor.evidence import ChangePrior, flicker_covariance
 from fogml.signals.distributions import students_ppf
+from fogml.signals.restricted import absent_or_not, weighed_models
 
 _RATIOS = np.concatenate(([0.0], 4.0 ** np.arange(-3.0, 4.0)))
 """Variance of flicker in a factor e of time, or of a walk from run to run, in that of the white part."""
@@ -30,25 +31,16 @@ def trend_quantiles(age: FloatArray, values: FloatArray, probabilities: tuple[fl
     probabilities
         Of the quantiles.
     """
-    n = len(age)
-    t = (age - age[0]) * ((n - 1) / float(np.ptp(age)))
-    flicker = flicker_covariance(t, ChangePrior().longest_wander)
-    walk = np.minimum(t[:, None], t)
-    table = np.column_stack((np.ones(n), age - age.mean(), values - values.mean()))
-    logs, slopes, scales = [], [], []
-    for q, r in product(_RATIOS, _RATIOS):
-        root = np.linalg.cholesky(np.eye(n) + q * flicker + r * walk)
-        white = np.linalg.solve(root, table)
-        basis, upper = np.linalg.qr(white[:, :2])
-        along = basis.T @ white[:, 2]
-        left = white[:, 2] - basis @ along
-        variance = max(float(left @ left) / (n - 2), 1e-300)
-        dets = np.log(np.abs(np.diag(root))).sum() + np.log(np.abs(np.diag(upper))).sum()
-        prior = -np.log(len(_RATIOS) - 1) * np.count_nonzero((q, r))
-        logs.append(float(prior - dets - 0.5 * (n - 2) * np.log(variance)))
-        slopes.append(float(along[1] / upper[1, 1]))
-        scales.append(float(np.sqrt(variance) / abs(upper[1, 1])))
-    weights = np.exp(np.array(logs) - max(logs))
-    weights /= weights.sum()
-    centres, widths = np.array(slopes), np.array(scales)
-    return [students_ppf(probability, weights, centres, widths, n - 2) for probability in probabilities]
+    t = (age - age[0]) * ((len(age) - 1) / float(np.ptp(age)))
+    ratios = np.array(list(product(_RATIOS, repeat=2)))
+    parts = np.stack((flicker_covariance(t, ChangePrior().longest_wander), np.minimum(t[:, None], t)))
+    models = weighed_models(
+        np.eye(len(age)) + np.tensordot(ratios, parts, 1),
+        np.column_stack((np.ones(len(age)), age - age.mean())),
+        values - values.mean(),
+        absent_or_not(ratios),
+    )
+    return [
+        students_ppf(probability, models.weights, models.constants, models.scales, models.freedom)
+        for probability in probabilities
+    ]

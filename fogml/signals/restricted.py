@@ -1,0 +1,108 @@
+"""Noise models weighed by restricted likelihood: what the constants of columns absorb is accounted for.
+
+Of each model the covariance is known up to a factor, which is integrated out (H. Patterson & R. Thompson,
+Biometrika 58 (1971) 545); given a model, a constant is off as Student's t. Few values tell little of their
+noise: so no model is chosen, all are averaged over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.arrays import FloatArray
+
+_AT_ONCE = 16
+"""Models weighed together."""
+
+
+@dataclass(frozen=True)
+class WeighedModels:
+    """Noise models, each by its place among those asked for.
+
+    Attributes
+    ----------
+    weights
+        Posterior probabilities, shape (m,).
+    variances
+        Factor of each covariance, shape (m,).
+    constants, scales
+        Constant of the last column by generalised least squares, and its standard error, shape (m,) each.
+    freedom
+        Degrees of freedom.
+    """
+
+    weights: FloatArray
+    variances: FloatArray
+    constants: FloatArray
+    scales: FloatArray
+    freedom: float
+
+
+def weighed_models(
+    covariances: FloatArray,
+    columns: FloatArray,
+    values: FloatArray,
+    beforehand: FloatArray,
+    *,
+    squares: FloatArray | float = 0.0,
+    log_determinants: FloatArray | float = 0.0,
+    freedom: float = 0.0,
+    least: float = 0.0,
+) -> WeighedModels:
+    """Noise models by what columns leave of values.
+
+    Parameters
+    ----------
+    covariances
+        Of the values up to a factor, shape (m, n, n), or the variances of independent values, shape (m, n).
+    columns
+        Independent columns that explain the values, shape (n, k).
+    values
+        Values, shape (n,).
+    beforehand
+        Logarithms of the models' prior probabilities, shape (m,), up to a constant.
+    squares, log_determinants, freedom
+        Of values beside these, independent of them and explained by no column: their whitened squares and
+        the logarithm of their covariance's determinant under each model, shape (m,) or alike under all, and
+        their degrees of freedom.
+    least
+        Least factor.
+    """
+    count, (n, k) = len(covariances), columns.shape
+    free = n - k + freedom
+    table = np.column_stack((columns, values))
+    likelihood, square = -0.5 * np.broadcast_to(log_determinants, count), np.zeros(count)
+    constants, scales = np.zeros((2, count))
+    for first in range(0, count, _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        if covariances.ndim == 2:
+            roots = np.sqrt(covariances[some])
+            white = table / roots[..., None]
+        else:
+            triangles = np.linalg.cholesky(covariances[some])
+            roots, white = np.diagonal(triangles, axis1=1, axis2=2), np.linalg.solve(triangles, table)
+        upper = np.asarray(np.linalg.qr(white, mode="r"))
+        sizes = np.abs(np.diagonal(upper, axis1=1, axis2=2))
+        likelihood[some] -= np.log(roots).sum(axis=1) + np.log(sizes[:, :k]).sum(axis=1)
+        square[some] = np.sum(sizes[:, k:] ** 2, axis=1)
+        if k:
+            constants[some] = upper[:, k - 1, -1] / upper[:, k - 1, k - 1]
+            scales[some] = 1.0 / sizes[:, k - 1]
+    variances = np.maximum((square + squares) / free, max(least, 1e-300))
+    likelihood += beforehand - 0.5 * free * np.log(variances)
+    weights = np.exp(likelihood - likelihood.max())
+    return WeighedModels(weights / weights.sum(), variances, constants, np.sqrt(variances) * scales, free)
+
+
+def absent_or_not(ratios: FloatArray) -> FloatArray:
+    """Log prior of models in which a part is as likely absent as there, and then of any of its sizes alike.
+
+    Parameters
+    ----------
+    ratios
+        Size of each part in each model, 0 where it is absent, shape (m, parts).
+    """
+    sizes = [np.count_nonzero(np.unique(part)) for part in ratios.T]
+    return -np.asarray((ratios != 0.0) @ np.log(np.maximum(sizes, 1)))
