@@ -1,4 +1,9 @@
-"""What of a normal distribution lies how far off its middle, in standard deviations."""
+"""What intervals hold, and how many standard deviations off its middle a normal value lies how often."""
+
+LEVEL = 0.9
+"""Share that an interval holds where nothing else is said."""
+TAILS = (0.05, 0.95)
+"""Shares below the two ends of such an interval."""
 
 Z50 = 0.6744897501960817
 """Half-width of the central interval that holds 50 %: the median of sizes."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
-from fogml.lab.rate_errors import LEVEL
+from fogml.intervals import LEVEL
 from fogml.lab.rate_pieces import Plateaus, merged
 from fogml.models.linear import LinearRegressor
 from fogml.models.row_noise import MEANS_A_STAY, noise_covariance

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.intervals import LEVEL
 from fogml.signals.distributions import student_ppf, students_ppf
 from fogml.signals.restricted import absent_or_not, weighed_models
 
-LEVEL = 0.9
 ONE_SIGMA = 0.682689492137
 """What a standard error on either side of a normal value holds."""
 _RATIOS = np.concatenate(([0.0], 2.0 ** np.arange(-2.0, 13.0)))

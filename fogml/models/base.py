@@ -15,6 +15,7 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
+from fogml.intervals import LEVEL
 from fogml.models.card import TrainingCard, check_unit_and_axis
 from fogml.models.compact import Compact
 from fogml.models.intervals import Intervals
@@ -240,7 +241,7 @@ class DriftModel(BaseEstimator, ABC):
         """Drift [deg/h] at every sample, shape (n,)."""
         return self.evaluate(run).drift
 
-    def predict_interval(self, run: Run, level: float = 0.9) -> tuple[FloatArray, FloatArray]:
+    def predict_interval(self, run: Run, level: float = LEVEL) -> tuple[FloatArray, FloatArray]:
         """Interval of the drift [deg/h], lower and upper, each of shape (n,).
 
         It covers a share `level` of the drift's averages over ``intervals_.averaging_s``, noise of

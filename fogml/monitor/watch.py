@@ -12,6 +12,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.intervals import TAILS
 from fogml.monitor.changes import ChangePrior, Chart, Shape, change_chart
 from fogml.monitor.record import FIGURES, RunRecord
 from fogml.monitor.trend import trend_quantiles
@@ -202,7 +203,7 @@ def _calibration(age: FloatArray, level: FloatArray, limit: float) -> Calibratio
     n = len(age)
     if n < 4 or not np.ptp(age) > 0.0:
         return None
-    low, trend, high = trend_quantiles(age, level, (0.05, 0.5, 0.95))
+    low, trend, high = trend_quantiles(age, level, (TAILS[0], 0.5, TAILS[1]))
 
     def due(slope: float) -> float:
         """Days from the last run until a line of that slope has gone as far as the limit."""

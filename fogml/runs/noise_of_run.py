@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.intervals import LEVEL
 from fogml.runs.noise_series import (
     NoiseSeries,
     joined,
@@ -27,8 +28,6 @@ from fogml.signals.noise_terms import NoiseTerms, noise_terms
 from fogml.signals.stationarity import stationarity
 
 SCHEMA = "fogml.noise/1"
-LEVEL = 0.9
-"""Coverage of the intervals."""
 MOVING_DEGC = 0.5
 """Span of minute averages from which a temperature counts as moving [degC]."""
 UNEVEN = 0.1

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
+from fogml.intervals import LEVEL
 from fogml.signals import large
 from fogml.signals.allan_confidence import degrees_of_freedom, noise_exponents, variance_interval
 
@@ -63,7 +64,7 @@ def allan_deviation(
     overlapping: bool = True,
     *,
     segments: Segments | None = None,
-    level: float = 0.9,
+    level: float = LEVEL,
 ) -> AllanResult:
     """Allan deviation of a rate.
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray
+from fogml.intervals import LEVEL
 
 
 def chi2_ppf(probability: ArrayLike, freedom: ArrayLike) -> Any:
@@ -41,7 +42,7 @@ def chi2_sf(value: ArrayLike, freedom: ArrayLike) -> Any:
     return chdtrc(freedom, value)
 
 
-def deviation_within(value: float, freedom: float, level: float = 0.9) -> tuple[float, float]:
+def deviation_within(value: float, freedom: float, level: float = LEVEL) -> tuple[float, float]:
     """Interval of a standard deviation that normal values show with so many degrees of freedom."""
     outside = 0.5 * (1.0 - level)
     low, high = (value * float(np.sqrt(freedom / chi2_ppf(p, freedom))) for p in (1.0 - outside, outside))

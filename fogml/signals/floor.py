@@ -93,8 +93,6 @@ def without_spikes(values: FloatArray) -> FloatArray:
 
 Columns = Callable[[IntArray], FloatArray]
 
-LEVEL = 0.9
-"""Coverage of a floor's interval."""
 PER_WINDOW = 20
 """Half periods in an averaging time of the fastest noise that is looked at: a faster one, an output filter, a
 dither or repeated values do not matter to the averages, and do not enter."""

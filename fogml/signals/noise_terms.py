@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.intervals import LEVEL
 from fogml.signals.allan import AllanResult, allan_deviation
 from fogml.signals.noise_search import NoiseSearch, search_noise
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
@@ -115,7 +116,7 @@ class NoiseTerms:
 def noise_terms(
     spectrum: Spectrum,
     allan: AllanResult,
-    level: float = 0.9,
+    level: float = LEVEL,
     *,
     least_tau_s: float = 0.0,
     ramps: int | None = None,
@@ -184,7 +185,7 @@ def noise_terms(
     )
 
 
-def noise_terms_of(values: FloatArray, sample_s: float, level: float = 0.9) -> NoiseTerms:
+def noise_terms_of(values: FloatArray, sample_s: float, level: float = LEVEL) -> NoiseTerms:
     """As `noise_terms`, of evenly sampled values [deg/h] without gaps, shape (n,)."""
     series = np.asarray(values, dtype=np.float64)
     ramp = sample_s * np.arange(len(series), dtype=np.float64)[:, None]

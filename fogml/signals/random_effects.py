@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
+from fogml.intervals import LEVEL
 from fogml.signals.distributions import student_ppf
 
 
@@ -24,7 +25,7 @@ class RandomEffects:
     between: float
     count: int
 
-    def next_value(self, level: float = 0.9) -> tuple[float, float]:
+    def next_value(self, level: float = LEVEL) -> tuple[float, float]:
         """Where the next unit's true value lies with a probability; by Student's t of as many units."""
         reach = float(student_ppf(0.5 + 0.5 * level, self.count - 1)) * float(np.hypot(self.se, self.between))
         return self.mean - reach, self.mean + reach

@@ -10,8 +10,9 @@ from typing import Literal
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.intervals import LEVEL
 from fogml.models.box import LEAST_SPAN_DEGC, ways_moved
-from fogml.validation.floors import LEVEL, floor_interval
+from fogml.validation.floors import floor_interval
 from fogml.validation.results import Judgement, RunJudgement
 
 Grade = Literal["use", "use_with_care", "do_not_use"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
+from fogml.intervals import LEVEL
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.noise_series import rows_at_rest
 from fogml.runs.run import Run
@@ -110,10 +111,6 @@ def _at_rows(run: Run, rows: IntArray) -> Columns:
     """What a drift may follow, by places among rows."""
     follows = thermal_columns(run)
     return lambda places: follows(run.time[rows[places]])
-
-
-LEVEL = 0.9
-"""Confidence of the interval about a floor."""
 
 
 def floor_interval(floor: float, averages: int, level: float = LEVEL) -> tuple[float, float]:

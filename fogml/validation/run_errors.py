@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
+from fogml.intervals import LEVEL
 from fogml.models.table import usable_rows
 from fogml.runs.run import Run
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
-
-INTERVAL_LEVEL = 0.9
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ def run_errors(model: DriftModel, run: Run, *, any_unit: bool = False) -> RunErr
         run=run,
         before=run.error_deg_h,
         drift=evaluation.drift,
-        half_width=model.intervals_.half_width(INTERVAL_LEVEL, evaluation.excess),
+        half_width=model.intervals_.half_width(LEVEL, evaluation.excess),
         flag=evaluation.flag,
         full=evaluation.full,
         used=used,
