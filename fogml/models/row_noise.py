@@ -25,18 +25,10 @@ from fogml.signals.whitening import Whitener
 
 _GAP = 1.5
 """Steps longer than this many usual ones part a run."""
-SKIPPED_SHARE = 0.05
-"""Rows lacking in gaps that are passed over, the shortest first, as a share of those there are.
-
-Were a stretch to end with each dropped row or turn of the table, slower noise would not be seen. So white
-noise stays white, and slow noise is sped up by this share."""
 _FEWEST = 8
 """Degrees of freedom that columns must leave for a noise to be told."""
 _LIGHT = 1e-4
 """Weight, in the greatest, below which a model no longer counts."""
-SLOWEST_CORNER_HZ = 1e-5
-"""Lowest frequency, a day's, at which flicker or walk may equal the white noise, however short the rows are:
-of a gyro it is between 1e-5 and 1e-2 Hz, and minutes of rows are white as a rule."""
 _OCTAVES_BEYOND = 2
 """Octaves above the highest frequency at which flicker or walk may still equal the white noise."""
 
@@ -78,13 +70,13 @@ def stretches_of(table: TrainingTable) -> tuple[list[slice], float]:
     return [slice(int(p[0]), int(p[-1]) + 1) for p in np.split(np.arange(len(table)), cuts)], step_s
 
 
-def _joined(table: TrainingTable) -> tuple[list[slice], float]:
+def _joined(table: TrainingTable, skipped_share: float) -> tuple[list[slice], float]:
     """Stretches of three rows or more, those across short gaps as one; and the step [s]."""
     parts, step_s = stretches_of(table)
     lacking = np.array([_rows_apart(table, *pair, step_s) - 1.0 for pair in pairwise(parts)])
     order = np.argsort(lacking, kind="stable")
     cut = np.ones(len(lacking), dtype=np.bool_)
-    cut[order] = np.cumsum(lacking[order]) > SKIPPED_SHARE * len(table)
+    cut[order] = np.cumsum(lacking[order]) > skipped_share * len(table)
     starts = [0, *(part.start for part, apart in zip(parts[1:], cut.tolist(), strict=True) if apart)]
     every = [slice(start, stop) for start, stop in pairwise([*starts, len(table)])]
     return [part for part in every if part.stop - part.start >= 3], step_s
@@ -98,31 +90,40 @@ def _rows_apart(table: TrainingTable, last: slice, part: slice, step_s: float) -
     return max(float(np.round((table.time_s[after] - table.time_s[before]) / step_s)), 1.0)
 
 
-def noise_of_rows(table: TrainingTable) -> RowNoise | None:
+def noise_of_rows(
+    table: TrainingTable, *, skipped_share: float = 0.05, slowest_corner_hz: float = 1e-5
+) -> RowNoise | None:
     """Noise of a table's values beside its columns and a constant of each stretch; None where they tell none.
 
     Parameters
     ----------
     table
         Rows in time order, run after run.
+    skipped_share
+        Rows lacking in gaps that are passed over, the shortest first, as a share of those there are. Were a
+        stretch to end with each dropped row or turn of the table, slower noise would not be seen. So white
+        noise stays white, and slow noise is sped up by this share.
+    slowest_corner_hz
+        Lowest frequency at which flicker or walk may equal the white noise, however short the rows are [Hz]:
+        a day's. Of a gyro it is between 1e-5 and 1e-2 Hz, and minutes of rows are white as a rule.
 
     Notes
     -----
     What moves a run as a whole from one to the next is no part of it. A form that is wrong leaves residuals
     that count as slow noise. Beforehand, flicker is as likely there as not, and so is the walk; the frequency
-    at which one that is there equals the white noise is as likely in any octave, from a day's on.
+    at which one that is there equals the white noise is as likely in any octave.
     """
     if len(table) < 3:
         return None
     scale = np.std(table.X, axis=0)
     columns = (table.X - table.X.mean(axis=0)) / np.where(scale > 0.0, scale, 1.0)
-    parts, step_s = _joined(table)
+    parts, step_s = _joined(table, skipped_share)
     if not parts:
         return None
     spectrum = spectrum_of([table.y[p] for p in parts], step_s, [columns[p] for p in parts])
     if not np.any(spectrum.power > 0.0):
         return None
-    lowest, half = min(float(spectrum.frequency_hz.min()), SLOWEST_CORNER_HZ), 0.5 / step_s
+    lowest, half = min(float(spectrum.frequency_hz.min()), slowest_corner_hz), 0.5 / step_s
     corners = lowest * 2.0 ** np.arange(np.log2(half / lowest) + _OCTAVES_BEYOND + 1.0)
     flicker = np.concatenate(([0.0], 2.0 * np.pi * corners))
     walk = np.concatenate(([0.0], 4.0 * np.pi**2 * corners**2))

@@ -31,7 +31,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.intervals import TAILS
+from fogml.intervals import LEVEL, TAILS
 from fogml.monitor.evidence import SHAPES, ChangePrior, FigureEvidence, Shape
 
 
@@ -169,7 +169,7 @@ def _change(
     chart = charts[name]
     best = int(np.argmax(shares))
     likely = np.argsort(-shares)
-    held = likely[: int(np.searchsorted(np.cumsum(shares[likely]), 0.9)) + 1]
+    held = likely[: int(np.searchsorted(np.cumsum(shares[likely]), LEVEL)) + 1]
     median, *ends = (chart.size_quantile(level, s, shares) for level in (0.5, *TAILS))
     return Change(
         raised_at=place,

@@ -13,8 +13,6 @@ from fogml.signals.distributions import students_ppf
 from fogml.signals.noise_model import flicker_ladder
 
 Shape = Literal["step", "ramp"]
-_UNLIKELY = 1e-4
-"""Probability of an onset below which it adds nothing to the interval of a change's size."""
 SHAPES: tuple[Shape, ...] = ("step", "ramp")
 
 
@@ -118,14 +116,12 @@ class FigureEvidence:
         white = w + (1.0 - w) * own[:, None]
         flicker = flicker_covariance(self._t, prior.longest_wander)
         covariances = flicker * q[:, None, None] + np.einsum("ng,nm->gnm", white, np.eye(n))
-        self._roots = np.linalg.cholesky(covariances)
-        self._columns = np.stack(
-            [self._shape(np.arange(start, n, dtype=np.intp), s) for s in range(len(SHAPES))], axis=-1
-        )
+        roots = np.linalg.cholesky(covariances)
+        columns = [self._shape(np.arange(start, n, dtype=np.intp), s) for s in range(len(SHAPES))]
         # Whitened by Cholesky's root, what the first runs tell does not depend on those that follow.
-        table = np.column_stack((self._y, np.ones(n), self._columns.reshape(n, -1)))
-        self._innovations = solve_triangular(self._roots, table[None], lower=True)
-        self._log_dets = np.cumsum(np.log(np.diagonal(self._roots, axis1=1, axis2=2)), axis=1)
+        table = np.column_stack((self._y, np.ones(n), np.stack(columns, axis=-1).reshape(n, -1)))
+        self._innovations = solve_triangular(roots, table[None], lower=True)
+        self._log_dets = np.cumsum(np.log(np.diagonal(roots, axis1=1, axis2=2)), axis=1)
         self._of_mean, self._of_values, self._squares = np.zeros((3, len(q), table.shape[1]))
 
     def _shape(self, onsets: IndexArray, shape: int) -> FloatArray:
@@ -175,30 +171,20 @@ class FigureEvidence:
 
     def size_quantile(self, level: float, shape: int, shares: FloatArray) -> float:
         """Quantile of a change's size, whose onset has the probabilities `shares`, shape (m,)."""
-        told = {int(change): self._size(int(change), shape) for change in np.flatnonzero(shares > _UNLIKELY)}
-        told = {change: size for change, size in told.items() if size is not None}
-        if not told:
+        n, onsets = self._done, np.flatnonzero(shares)
+        whitened = self._innovations[self._best, :n]
+        # A line through whitened runs: of each column and of the values what is left beside the mean.
+        mean = whitened[:, 1] / np.linalg.norm(whitened[:, 1])
+        left = whitened - np.outer(mean, mean @ whitened)
+        columns, y = left[:, 2 + len(SHAPES) * onsets + shape], left[:, 0]
+        if shape == 1 and np.ptp(self._age[:n]) > 0.0:
+            columns *= np.ptp(self._age[:n]) / np.ptp(self._t[:n])
+        lengths = np.linalg.norm(columns, axis=0)
+        told = lengths > 1e-9 * np.linalg.norm(whitened[:, 2 + len(SHAPES) * onsets + shape], axis=0)
+        if not told.any():
             return 0.0 if level == 0.5 else float(np.copysign(np.inf, level - 0.5))
-        weights, (centres, scales) = shares[list(told)], np.array(list(told.values())).T
-        return students_ppf(level, weights / weights.sum(), centres, scales, self._done - 2)
-
-    def _size(self, change: int, shape: int) -> tuple[float, float] | None:
-        """A change's size by generalised least squares from a given run on, and its standard error.
-
-        None where it is not told from the mean.
-        """
-        n = self._done
-        age = self._age[:n]
-        t = self._t[:n]
-        column = self._columns[:n, change, shape].copy()
-        if shape == 1 and np.ptp(age) > 0.0:
-            column *= np.ptp(age) / np.ptp(t)
-        root = self._roots[self._best, :n, :n]
-        table = np.linalg.solve(root, np.stack((np.ones(n), column, self._y[:n]), axis=1))
-        q, r = np.linalg.qr(table[:, :2])
-        if abs(r[1, 1]) <= 1e-9 * abs(r[0, 0]) * np.abs(column).max():
-            return None
-        size = float(q[:, 1] @ table[:, 2] / r[1, 1])
-        left = table[:, 2] - q @ (q.T @ table[:, 2])
-        error = float(np.sqrt(left @ left / (n - 2)) / abs(r[1, 1]))
-        return size, max(error, np.spacing(abs(size)))
+        columns, lengths, weights = columns[:, told], lengths[told], shares[onsets[told]]
+        sizes = y @ columns / lengths**2
+        scales = np.linalg.norm(y[:, None] - columns * sizes, axis=0) / np.sqrt(n - 2) / lengths
+        scales = np.maximum(scales, np.spacing(np.abs(sizes)))
+        return students_ppf(level, weights / weights.sum(), sizes, scales, n - 2)

@@ -8,20 +8,20 @@ import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
 
-SETTLED_SHARE = 1e-8
-"""Share of a step that settling may still lack: a hundredth of a ppm of the scale factor."""
 LEAST_ROWS = 4
 """Rows that tell a mean and a line."""
-PARTS = 16
-"""Parts of a plateau that tell how well its mean is known."""
-_GROWTH = 1.5
-"""What a window's end is of its begin."""
-_ERRORS = 4.0
-"""Standard errors beyond which the output has not settled."""
 
 
 def settling_rows(
-    output: FloatArray, starts: IndexArray, stops: IndexArray, heights: FloatArray, first: int
+    output: FloatArray,
+    starts: IndexArray,
+    stops: IndexArray,
+    heights: FloatArray,
+    first: int,
+    *,
+    growth: float = 1.5,
+    errors: float = 4.0,
+    share: float = 1e-8,
 ) -> int:
     """Rows after a step in which the output lacks some of it, `first` at least, half of a plateau at most.
 
@@ -38,6 +38,12 @@ def settling_rows(
         Those steps of the output, shape (k,).
     first
         Row that the search begins with.
+    growth
+        What a window's end is of its begin, over 1: settling is told as finely, by means of so many rows.
+    errors
+        Standard errors beyond which the output has not settled; of tens of windows noise takes none so far.
+    share
+        Of a step, what may lack all the same: a hundredth of a ppm of the scale factor, and no rounding.
     """
     plateaus = [
         _settled(output, start, stop, height)
@@ -46,7 +52,7 @@ def settling_rows(
     ]
     settling = first
     while True:
-        last = max(first + LEAST_ROWS, round(_GROWTH * first))
+        last = max(first + LEAST_ROWS, round(growth * first))
         lacked = squares = noise = 0.0
         for start, half, height, count, mean, slope, spread, one in plateaus:
             if start + first + LEAST_ROWS > half:
@@ -58,9 +64,9 @@ def settling_rows(
             noise += height**2 * one * (1 / len(part) + 1 / count + away**2 / spread)
         if not squares > 0.0:
             return settling
-        if abs(lacked) > max(_ERRORS * np.sqrt(noise), SETTLED_SHARE * squares):
+        if abs(lacked) > max(errors * np.sqrt(noise), share * squares):
             # One window more: what is left goes on to fall where noise hides it.
-            settling = round(_GROWTH * last)
+            settling = round(growth * last)
         first = last
 
 
@@ -91,11 +97,18 @@ def _settled(output: FloatArray, start: int, stop: int, height: float) -> _Settl
     return _Settled(start, half, height, count, float(settled.mean()), slope, spread, variance)
 
 
-def error_of_mean(part: FloatArray) -> float:
+def error_of_mean(part: FloatArray, parts: int = 16) -> float:
     """Standard error of a mean from differences of neighbouring parts, so that a drift is no noise.
 
     Of parts and not of rows: rounding to whole counts, which rows hold, averages out sooner than noise.
+
+    Parameters
+    ----------
+    part
+        Rows, shape (n,).
+    parts
+        How many there are: few have room for noise that is slower than a row, many tell it to a sixth.
     """
-    rows = max(len(part) // PARTS, 1)
+    rows = max(len(part) // parts, 1)
     means = part[len(part) % rows :].reshape(-1, rows).mean(axis=1)
     return float(np.sqrt(0.5 * np.mean(np.diff(means) ** 2) / len(means)))
