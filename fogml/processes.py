@@ -179,8 +179,11 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def one_thread(api: Literal["blas", "openmp"]) -> Any:
-    """A context in which calls of BLAS, or OpenMP, use one thread each."""
+def one_thread(api: Literal["blas", "openmp"] | None = None) -> Any:
+    """A context in which calls of BLAS, or OpenMP, or both, use one thread each.
+
+    As workers do: sums come out the same however many cores or workers there are.
+    """
     return _controller(frozenset(filter(sys.modules.__contains__, _POOLED))).limit(limits=1, user_api=api)
 
 

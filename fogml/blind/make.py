@@ -22,7 +22,7 @@ from fogml.blind.plan import FIRST, SAME_TWIN, Plan, Strata, plans, reality
 from fogml.blind.truth import Amount, Runs, Segment, TrueClosed, TrueEffect, Truth, read_truth, write_truth
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
-from fogml.processes import in_processes
+from fogml.processes import in_processes, one_thread
 from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
@@ -251,12 +251,9 @@ def make_cases(
 
 
 def _make(cases: Path, truth: Path, seed: int, sample_s: float, plan: Plan) -> None:
-    from threadpoolctl import threadpool_limits
-
     from fogml.blind.same_twin import make_same_twin
 
-    # One thread a process; sums then also come out the same on any machine's number of cores.
-    with threadpool_limits(limits=1):
+    with one_thread():
         make = make_same_twin if plan.reality == SAME_TWIN else make_case
         make(cases, truth, plan, seed, sample_s)
 

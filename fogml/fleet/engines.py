@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, as_completed
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from secrets import token_hex
@@ -15,7 +14,7 @@ from fogml.fleet.tasks import Task, finished, lost, run_task
 from fogml.folders import nearest_folder
 from fogml.models.rbf.together import fit_together
 from fogml.outputs import settle
-from fogml.processes import worker_pool
+from fogml.processes import one_thread, worker_pool
 
 Outcome = dict[str, Any]
 Progress = Callable[[Outcome], None]
@@ -69,7 +68,7 @@ def run_tasks(
     if cluster is not None:
         _on_cluster(todo, cluster, keep)
     elif workers == 1:
-        with _one_thread():
+        with one_thread():
             for task in todo:
                 keep(task, run_task(task))
     else:
@@ -164,15 +163,6 @@ def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outco
             keep(task, outcome)
             # The outcome is on disk: a worker that dies later takes nothing along.
             future.release()
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """One thread for linear algebra, as in processes: results are the same however many there are."""
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1):
-        yield
 
 
 def run_batched(

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals, joint_uncertainty
@@ -32,6 +31,7 @@ from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.result_parts import Nearest, WhatIf
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.where import GapOnRun, where
+from fogml.processes import one_thread
 from fogml.runs.epochs import with_epoch
 from fogml.runs.run import Run
 from fogml.twin.registry import effects
@@ -116,7 +116,7 @@ def inferred(
     fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
     if not held_out:
         fit, held_out = keep_back(fit, (priors or STANDARD).rows.kept_back)
-    with threadpool_limits(1):
+    with one_thread():
         return infer(model, fit, held_out, noise, without, priors or STANDARD, tell)
 
 
@@ -132,7 +132,7 @@ def answered(
     tell: Progress = lambda what: None,
 ) -> Diagnosis:
     """What is said of a posterior; `part` where the last stretch of the last run was held out."""
-    with threadpool_limits(1):
+    with one_thread():
         judged = judge(found)
         answer = _answer(found, judged, noise, part, seed, cost_of_false_name, courses)
         if plan:

@@ -12,7 +12,7 @@ from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
 
 from fogml.errors import FogmlError, InputError
-from fogml.processes import begin_worker
+from fogml.processes import begin_worker, one_thread
 from fogml.tuning.held_out import HeldOut
 from fogml.tuning.plan import Plan
 from fogml.tuning.references import reference_choices
@@ -73,12 +73,9 @@ def _held_out(plan: Plan) -> HeldOut:
 
 
 def _work_alone(study: optuna.Study, plan: Plan, held_out: HeldOut, progress: Progress | None) -> None:
-    from threadpoolctl import threadpool_limits
-
     from fogml.tuning.worker import work
 
-    # One thread, as in a crew: sums come out the same however many workers there are.
-    with threadpool_limits(limits=1):
+    with one_thread():
         work(study, plan, held_out, progress)
 
 
