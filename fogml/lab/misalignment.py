@@ -18,7 +18,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
@@ -32,6 +31,7 @@ from fogml.lab.misalignment_errors import (
     slope_noise,
 )
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, check_order, sense_of, solve
+from fogml.signals.distributions import variances_sf
 
 _CROSS_TILT_TEST = 0.01
 
@@ -281,7 +281,7 @@ def _shows_cross_tilt(slopes: Mapping[int, Slopes]) -> bool:
     if after <= (ROUND_OFF * scale) ** 2 * dof:
         return before > (ROUND_OFF * scale) ** 2 * dof
     ratio = (before - after) / len(wide) / (after / dof)
-    return bool(stats.f.sf(ratio, len(wide), dof) < _CROSS_TILT_TEST)
+    return variances_sf(ratio, len(wide), dof) < _CROSS_TILT_TEST
 
 
 def _weights(fits: tuple[StateFit, ...], variances: tuple[FloatArray, ...] | None) -> FloatArray:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import stats
 
 from fogml.arrays import FloatArray
+from fogml.signals.distributions import student_ppf, variances_isf
 
 LEVEL = 0.95
 """Confidence of intervals and of the region."""
@@ -75,7 +75,7 @@ def slope_noise(
         notes: tuple[str, ...] = ()
         scale = max(float(np.abs(fit.slopes).max()) for fit in fits)
         real = by_tilts > (ROUND_OFF * scale) ** 2
-        if real and by_rates and by_tilts > stats.f.isf(0.01, dof_tilts, dof_rates) * by_rates:
+        if real and by_rates and by_tilts > variances_isf(0.01, dof_tilts, dof_rates) * by_rates:
             notes = (
                 "slopes scatter over the tilts more than noise explains: errors of the tilt settings, "
                 "or drift between the tilts; the standard errors hold them",
@@ -135,7 +135,7 @@ def errors_of(
 ) -> tuple[dict[str, float | list[float]], dict[str, tuple[float, float]], Region]:
     sd = np.sqrt(np.diag(covariance))
     region = _region(values[1:3], covariance[1:3, 1:3], dof)
-    factor = float(stats.t.isf((1.0 - LEVEL) / 2.0, dof))
+    factor = float(student_ppf(0.5 * (1.0 + LEVEL), dof))
     names = ("K", "delta_x_deg", "delta_y_deg")
     intervals = {
         n: (float(values[i] - factor * sd[i]), float(values[i] + factor * sd[i])) for i, n in enumerate(names)
@@ -160,7 +160,7 @@ def _holds_zero(centre: FloatArray, covariance: FloatArray, dof: int) -> bool:
 
 
 def _region_factor(dof: int) -> float:
-    return 2.0 * float(stats.f.isf(1.0 - LEVEL, 2, dof))
+    return 2.0 * variances_isf(1.0 - LEVEL, 2, dof)
 
 
 def _region(centre: FloatArray, covariance: FloatArray, dof: int) -> Region:

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from itertools import permutations
 
 import numpy as np
-from scipy import stats
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.signals.distributions import variances_isf, variances_sf
 
 STATES = (1, 2, 3, 4)
 DOCUMENT_ANGLES_DEG = (0.0, 180.0, 270.0, 90.0)
@@ -172,7 +172,7 @@ def check_order(
     redundant = 2 * len(STATES) - 4
 
     def chance(squares: float) -> float:
-        return float(stats.f.sf(squares / redundant, redundant, dof or np.inf))
+        return variances_sf(squares / redundant, redundant, dof or np.inf)
 
     *_, left = _fitted(c, weights, angles_deg, common)
     p_value = chance(left)
@@ -185,7 +185,7 @@ def check_order(
         others.append((squares, sum(a != b for a, b in zip(turns, angles_deg)), turns))
     best = min(squares for squares, _, _ in others)
     alike = [(moved, turns) for squares, moved, turns in others if squares <= best * 1.01 + 1e-9 * left]
-    better = left > best * float(stats.f.isf(fits, 1, 1))
+    better = left > best * variances_isf(fits, 1, 1)
     if better or (dof and chance(best) > fits):
         turns = min(alike)[1]
         reverse = tuple((-turn) % 360.0 for turn in turns)

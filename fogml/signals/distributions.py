@@ -1,4 +1,4 @@
-"""Quantiles and tails of chi-square and Student's t, to the bit those of `scipy.stats`.
+"""Quantiles and tails of normal values, chi-square, Student's t and F, to the bit those of `scipy.stats`.
 
 That package takes longer to load than most commands need for all else; `scipy.special` is loaded by use, too.
 """
@@ -88,8 +88,18 @@ def normal_ppf(probability: ArrayLike) -> Any:
     return ndtri(probability)
 
 
-def variances_sf(ratio: float, above: int, below: int) -> float:
-    """Probability of a ratio of two mean squares, of so many degrees of freedom each, over a value (F)."""
+def variances_sf(ratio: float, above: int, below: float) -> float:
+    """Probability of a ratio of two mean squares, of so many degrees of freedom each, over a value (F).
+
+    The lower one is known where it has infinitely many.
+    """
     from scipy.special import fdtrc
 
-    return float(fdtrc(above, below, ratio))
+    return float(chi2_sf(ratio * above, above) if np.isinf(below) else fdtrc(above, below, ratio))
+
+
+def variances_isf(probability: float, above: int, below: int) -> float:
+    """Value over which a ratio of two mean squares lies with a probability (F)."""
+    from scipy.special import fdtri
+
+    return float(fdtri(above, below, 1.0 - probability))

@@ -37,6 +37,8 @@ def test_values_are_those_of_scipy(function: Callable[..., Any], theirs: Any, at
 def test_of_a_normal_value_and_of_two_mean_squares() -> None:
     np.testing.assert_array_equal(own.normal_ppf(PROBABILITY), stats.norm.ppf(PROBABILITY))
     assert own.variances_sf(2.5, 3, 20) == stats.f.sf(2.5, 3, 20)
+    assert own.variances_sf(2.5, 3, np.inf) == pytest.approx(stats.f.sf(2.5, 3, 1e9))
+    assert own.variances_isf(0.05, 3, 20) == stats.f.isf(0.05, 3, 20)
 
 
 def test_a_mixture_of_students() -> None:
