@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from fogml.report import style
 from fogml.report.page import Tile, render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Row, Table, columns_of
 from fogml.report.words import MISSING, listed, number, percent, plural, stated
 from fogml.static_svg import Curve, line_figure
 
@@ -119,24 +119,21 @@ def _soaks(values: Mapping[str, Any]) -> Table | None:
     parts = [("start", "at the start"), ("up", "on the way up"), ("down", "on the way down")]
     parts = [part for part in parts if any(line["before"][part[0]] is not None for line in lines)]
     parts.append(("hysteresis", "hysteresis"))
-    columns = [("Run", "", "text")] if several else []
-    columns.append(("Soak", "°C", "figure"))
+    columns = [*columns_of("Run | >Soak [°C]" if several else ">Soak [°C]")]
     columns += [
         (f"{words}, {when}" if len(whens) > 1 else words, "deg/h", "figure")
         for when in whens
         for _, words in parts
     ]
     rows = [
-        Row(
-            (
-                *((line["run"],) if several else ()),
-                f"{line['temperature_degC']:.1f}".replace("-", "−"),
-                *(number(line[when][key]) for when in whens for key, _ in parts),
-            )
+        (
+            *((line["run"],) if several else ()),
+            f"{line['temperature_degC']:.1f}".replace("-", "−"),
+            *(number(line[when][key]) for when in whens for key, _ in parts),
         )
         for line in lines
     ]
-    return Table(tuple(columns), tuple(rows), f"Bias in the soaks of {listed(_names(lines), 3)}.")
+    return Table(columns, rows, f"Bias in the soaks of {listed(_names(lines), 3)}.")
 
 
 def _names(lines: list[Mapping[str, Any]]) -> list[str]:
@@ -169,27 +166,18 @@ def _figure(values: Mapping[str, Any]) -> Markup | None:
 
 
 def _runs(values: Mapping[str, Any]) -> Table:
-    columns = (
-        ("Run", "", "text"),
-        ("Started", "", "text"),
-        ("Length", "h", "figure"),
-        ("T from", "°C", "figure"),
-        ("to", "°C", "figure"),
-        ("Outside training", "", "figure"),
-    )
+    columns = columns_of("Run | Started | >Length [h] | >T from [°C] | >to [°C] | >Outside training")
     rows = [
-        Row(
-            (
-                run["run"],
-                (run["started"] or MISSING)[:16].replace("T", " "),
-                number(run["span_h"]),
-                *(number(end) for end in run["temperature_degC"]),
-                percent(run["outside_training"]) if values["model"] is not None else MISSING,
-            )
+        (
+            run["run"],
+            (run["started"] or MISSING)[:16].replace("T", " "),
+            number(run["span_h"]),
+            *(number(end) for end in run["temperature_degC"]),
+            percent(run["outside_training"]) if values["model"] is not None else MISSING,
         )
         for run in values["runs"]
     ]
-    return Table(columns, tuple(rows))
+    return Table(columns, rows)
 
 
 def files_of(values: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -259,29 +247,22 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
 
 def _distribution(values: Mapping[str, Any]) -> Table:
     parts = ("least", "q10", "median", "q90", "largest")
-    columns = (
-        ("Quantity", "", "text"),
-        ("Unit", "", "text"),
-        ("Units tested", "", "figure"),
-        *((head, "", "figure") for head in ("Least", "10 %", "Median", "90 %", "Largest")),
-        ("Limit", "", "figure"),
-        ("Over", "", "figure"),
+    columns = columns_of(
+        "Quantity | Unit | >Units tested | >Least | >10 % | >Median | >90 % | >Largest | >Limit | >Over"
     )
     rows = [
-        Row(
-            (
-                one["name"],
-                one["unit"],
-                str(one["tested"]),
-                *(number(one["distribution"][part]) for part in parts),
-                limit_words(one["limit"]) or MISSING,
-                str(one["over"]),
-            )
+        (
+            one["name"],
+            one["unit"],
+            str(one["tested"]),
+            *(number(one["distribution"][part]) for part in parts),
+            limit_words(one["limit"]) or MISSING,
+            str(one["over"]),
         )
         for one in values["quantities"]
     ]
     return Table(
-        columns, tuple(rows), "Sizes of the figures that count: after compensation, where there is a model."
+        columns, rows, "Sizes of the figures that count: after compensation, where there is a model."
     )
 
 
@@ -296,4 +277,4 @@ def _units(units: Sequence[Mapping[str, Any]], shown: Sequence[Mapping[str, Any]
         told = [number(figure) + (" ✗" if key in unit["missed"] else "") for key, figure in figures.items()]
         cells = (name, f"{sign} {words}", *told)
         rows.append(Row(cells, link=unit["page"], badge=kind, keys=(name, words, *figures.values())))
-    return Table((("Unit", "", "text"), ("Verdict", "", "text"), *heads), tuple(rows), sortable=True)
+    return Table((*columns_of("Unit | Verdict"), *heads), rows, sortable=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 from fogml.report.acceptance_page import VERDICTS, limit_words
 from fogml.report.page import render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.verdict import GRADES
 from fogml.report.words import MISSING, averages, duration, number
 
@@ -27,7 +27,6 @@ _KICKERS = {
     "noise": "Noise, axis by axis",
     "lab acceptance": "Acceptance reports, axis by axis",
 }
-Columns = tuple[tuple[str, str, str], ...]
 
 
 def axes_page(values: Mapping[str, Any], links: Mapping[str, str]) -> str:
@@ -41,11 +40,8 @@ def axes_page(values: Mapping[str, Any], links: Mapping[str, str]) -> str:
         Axis to the address of its page.
     """
     command, axes = values["command"], values["axes"]
-    columns, row = _TABLES[command]
-    table = Table(
-        (("Axis", "", "text"), *columns),
-        tuple(Row((axis, *row(told))) for axis, told in axes.items()),
-    )
+    headings, row = _TABLES[command]
+    table = Table(columns_of(f"Axis | {headings}"), ((axis, *row(told)) for axis, told in axes.items()))
     return render(
         "axes.html",
         title=f"fogml {command} – axes {', '.join(axes)}",
@@ -136,58 +132,34 @@ def _acceptance(told: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-_TABLES: dict[str, tuple[Columns, Callable[[Mapping[str, Any]], tuple[str, ...]]]] = {
+_TABLES: dict[str, tuple[str, Callable[[Mapping[str, Any]], tuple[str, ...]]]] = {
     "train": (
         (
-            ("Model", "", "text"),
-            ("Rms before", "deg/h", "figure"),
-            ("Rms after", "deg/h", "figure"),
-            ("Bias stability after", "deg/h", "figure"),
-            ("Noise floor", "deg/h", "figure"),
-            ("Of", "", "text"),
-            ("Why", "", "text"),
+            "Model | >Rms before [deg/h] | >Rms after [deg/h] | >Bias stability after [deg/h] | "
+            ">Noise floor [deg/h] | Of | Why"
         ),
         _train,
     ),
     "compare": (
         (
-            ("Rms before", "deg/h", "figure"),
-            ("Rms, auto", "deg/h", "figure"),
-            ("Least on the test runs", "", "text"),
-            ("Its rms", "deg/h", "figure"),
-            ("Noise floor", "deg/h", "figure"),
+            ">Rms before [deg/h] | >Rms, auto [deg/h] | Least on the test runs | >Its rms [deg/h] | "
+            ">Noise floor [deg/h]"
         ),
         _compare,
     ),
     "inspect": (
-        (
-            ("Rows", "", "figure"),
-            ("Span", "", "figure"),
-            ("Mean", "deg/h or counts", "figure"),
-            ("Standard deviation", "deg/h or counts", "figure"),
-            ("Noticed", "", "text"),
-        ),
+        ">Rows | >Span | >Mean [deg/h or counts] | >Standard deviation [deg/h or counts] | Noticed",
         _inspect,
     ),
     "noise": (
         (
-            ("Q", "µrad", "figure"),
-            ("N", "deg/√h", "figure"),
-            ("B", "deg/h", "figure"),
-            ("K", "deg/h/√h", "figure"),
-            ("R", "deg/h/h", "figure"),
-            ("Least deviation", "deg/h", "figure"),
-            ("at", "s", "figure"),
+            ">Q [µrad] | >N [deg/√h] | >B [deg/h] | >K [deg/h/√h] | >R [deg/h/h] | "
+            ">Least deviation [deg/h] | >at [s]"
         ),
         _noise,
     ),
     "lab acceptance": (
-        (
-            ("Tested", "", "figure"),
-            ("Limits met", "", "figure"),
-            ("Missed", "", "text"),
-            ("Why", "", "text"),
-        ),
+        ">Tested | >Limits met | Missed | Why",
         _acceptance,
     ),
 }

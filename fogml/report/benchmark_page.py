@@ -11,7 +11,7 @@ from fogml.benchmark.score import ALL, FIGURES
 from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.style import log_axis
-from fogml.report.tables import Column, Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.words import MISSING, number, percent, plural
 
 _WORDS = (
@@ -94,31 +94,23 @@ def drift_table(values: Mapping[str, Any]) -> Table | None:
     for name in _ranked(values):
         told = values["drift"][name]["figures"][ALL]
         rows.append(
-            Row(
-                (
-                    name,
-                    value_text(told["ratio"]),
-                    number(told["worst"]),
-                    share_text(told["harmful"]),
-                    value_text(told["coverage"]),
-                    value_text(told["width"]),
-                    MISSING if told["bytes"] is None else f"{told['bytes']:.0f}",
-                    str(told["failed"]),
-                )
+            (
+                name,
+                value_text(told["ratio"]),
+                number(told["worst"]),
+                share_text(told["harmful"]),
+                value_text(told["coverage"]),
+                value_text(told["width"]),
+                MISSING if told["bytes"] is None else f"{told['bytes']:.0f}",
+                str(told["failed"]),
             )
         )
-    columns: tuple[Column, ...] = (
-        ("Entry", "", "text"),
-        ("Rms / nothing", "", "figure pair"),
-        ("Worst", "", "figure"),
-        ("Harmful", "", "figure pair"),
-        ("Coverage of 90 %", "", "figure pair"),
-        ("Width / nothing", "", "figure pair"),
-        ("Model", "byte", "figure"),
-        ("Failed", "", "figure"),
+    columns = columns_of(
+        "Entry | >>Rms / nothing | >Worst | >>Harmful | >>Coverage of 90 % | >>Width / nothing | "
+        ">Model [byte] | >Failed"
     )
     count = plural(len(values["cases"]["drift"]), "case")
-    return Table(columns, tuple(rows), f"Drift models, {count}, all groups together.")
+    return Table(columns, rows, f"Drift models, {count}, all groups together.")
 
 
 def drift_groups(values: Mapping[str, Any]) -> Table | None:
@@ -130,10 +122,10 @@ def drift_groups(values: Mapping[str, Any]) -> Table | None:
     rows = []
     for name in names:
         figures = values["drift"][name]["figures"]
-        rows.append(Row((name, *(value_text(figures[group]["ratio"]) for group in groups))))
+        rows.append((name, *(value_text(figures[group]["ratio"]) for group in groups)))
     counts = [values["drift"][names[0]]["figures"][group]["cases"] for group in groups]
     heads = tuple((f"{group} ({count})", "", "figure pair") for group, count in zip(groups, counts))
-    return Table((("Entry", "", "text"), *heads), tuple(rows), "Rms / nothing by data; cases in brackets.")
+    return Table((*columns_of("Entry"), *heads), rows, "Rms / nothing by data; cases in brackets.")
 
 
 def diagnosis_table(values: Mapping[str, Any]) -> Table | None:
@@ -145,11 +137,11 @@ def diagnosis_table(values: Mapping[str, Any]) -> Table | None:
     for key, (words, _) in FIGURES.items():
         parts = [one["figures"][ALL][key] for one in entries.values()]
         share = key in ("found", "false", "unknown", "quiet")
-        rows.append(Row((words, *((share_text if share else value_text)(part) for part in parts))))
-    rows.append(Row(("cases that failed", *(str(one["figures"][ALL]["failed"]) for one in entries.values()))))
+        rows.append((words, *((share_text if share else value_text)(part) for part in parts)))
+    rows.append(("cases that failed", *(str(one["figures"][ALL]["failed"]) for one in entries.values())))
     count = plural(len(values["cases"]["diagnosis"]), "case")
     heads = tuple((name, "", "figure pair") for name in entries)
-    return Table((("Figure", "", "text"), *heads), tuple(rows), f"Diagnoses, {count}, synthetic.")
+    return Table((*columns_of("Figure"), *heads), rows, f"Diagnoses, {count}, synthetic.")
 
 
 def value_text(told: Mapping[str, Any]) -> str:

@@ -20,7 +20,7 @@ from fogml.report.blind_tables import (
     wanted_text,
 )
 from fogml.report.page import render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.words import MISSING, listed, number, percent, plural, stated
 
 _ORACLE = "oracle"
@@ -113,26 +113,18 @@ def _figures(rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Ta
             "their kind alone."
         )
     return Table(
-        columns=(
-            ("Figure", "", "text"),
-            ("Reached", "95 % interval", "figure"),
-            ("Wanted", "", "figure"),
-            ("Outcome", "", "text"),
-            ("n", "", "figure"),
-            ("Cases", "", "figure"),
-            ("Prototype", "", "figure"),
+        columns=columns_of(
+            "Figure | >Reached [95 % interval] | >Wanted | Outcome | >n | >Cases | >Prototype"
         ),
-        rows=tuple(
-            Row(
-                (
-                    row["words"],
-                    figure_text(row),
-                    wanted_text(row),
-                    _outcome(row),
-                    str(row["n"]),
-                    str(row["cases"]),
-                    row["prototype"],
-                )
+        rows=(
+            (
+                row["words"],
+                figure_text(row),
+                wanted_text(row),
+                _outcome(row),
+                str(row["n"]),
+                str(row["cases"]),
+                row["prototype"],
             )
             for row in rows
         ),
@@ -142,12 +134,12 @@ def _figures(rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Ta
 
 def _others(methods: Mapping[str, Any], name: str) -> Table:
     order = [name, *(m for m in methods if m not in (name, _ORACLE)), *(m for m in methods if m == _ORACLE)]
-    columns = [("Figure", "", "text"), ("Wanted", "", "figure"), *((m, "", "figure") for m in order)]
+    columns = [*columns_of("Figure | >Wanted"), *((m, "", "figure") for m in order)]
     tables = {m: {row["key"]: row for row in methods[m]["rows"]} for m in order}
     rows = []
     for row in methods[name]["rows"]:
         cells = (value_text(tables[m][row["key"]]["value"], row["format"]) for m in order)
-        rows.append(Row((row["words"], wanted_text(row), *cells)))
+        rows.append((row["words"], wanted_text(row), *cells))
     answered: dict[int, list[str]] = {}
     for m in order:
         answered.setdefault(tables[m]["failed"]["cases"], []).append(m)
@@ -155,7 +147,7 @@ def _others(methods: Mapping[str, Any], name: str) -> Table:
     if len(answered) > 1:
         shares = (f"{listed(found, len(order))}: {count}" for count, found in answered.items())
         told = f"The same scorer for every method. Cases of the mix that were answered: {'; '.join(shares)}."
-    return Table(tuple(columns), tuple(rows), told)
+    return Table(columns, rows, told)
 
 
 def _strata(rows: Sequence[Mapping[str, Any]]) -> Table:
@@ -163,13 +155,11 @@ def _strata(rows: Sequence[Mapping[str, Any]]) -> Table:
     names.sort(key=lambda name: (name.startswith("over"), not name.startswith("under"), _first(name)))
     shown = [row for row in rows if row["by_stratum"]]
     return Table(
-        columns=(("Figure", "", "text"), *((f"d′ {name}", "", "figure") for name in names)),
-        rows=tuple(
-            Row(
-                (
-                    row["words"].replace(", d′ > 10", ""),
-                    *(_part(row, row["by_stratum"].get(n)) for n in names),
-                )
+        columns=(*columns_of("Figure"), *((f"d′ {name}", "", "figure") for name in names)),
+        rows=(
+            (
+                row["words"].replace(", d′ > 10", ""),
+                *(_part(row, row["by_stratum"].get(n)) for n in names),
             )
             for row in shown
         ),
@@ -189,8 +179,8 @@ def _part(row: Mapping[str, Any], part: Mapping[str, Any] | None) -> str:
 
 def _by_kind(values: Mapping[str, Any]) -> Table:
     return Table(
-        columns=(("Kind", "", "text"), ("Cases", "", "figure")),
-        rows=tuple(Row((kind_words(kind), str(n))) for kind, n in values["kinds"].items()),
+        columns=columns_of("Kind | >Cases"),
+        rows=((kind_words(kind), str(n)) for kind, n in values["kinds"].items()),
     )
 
 
@@ -201,31 +191,23 @@ def _left_out(parts: Sequence[Mapping[str, Any]]) -> Table:
         names = [f"{name} {count}" for name, count in part["wrong_names"].items()]
         relatives = [f"{name} {count}" for name, count in part["relatives"].items()]
         rows.append(
-            Row(
-                (
-                    part["effect"],
-                    "left out" if part["in_library"] else "in no library",
-                    str(flagged["n"]),
-                    number(part["d_prime"]),
-                    percent(flagged["value"]),
-                    percent(wrong["value"]),
-                    listed(names, 3) or MISSING,
-                    listed(relatives, 3) or MISSING,
-                )
+            (
+                part["effect"],
+                "left out" if part["in_library"] else "in no library",
+                str(flagged["n"]),
+                number(part["d_prime"]),
+                percent(flagged["value"]),
+                percent(wrong["value"]),
+                listed(names, 3) or MISSING,
+                listed(relatives, 3) or MISSING,
             )
         )
     return Table(
-        columns=(
-            ("Unknown", "", "text"),
-            ("Kind", "", "text"),
-            ("Cases", "", "figure"),
-            ("d′", "median", "figure"),
-            ("Seen as unknown", "", "figure"),
-            ("Wrong name", "", "figure"),
-            ("Wrong names", "", "text"),
-            ("Relatives named", "", "text"),
+        columns=columns_of(
+            "Unknown | Kind | >Cases | >d′ [median] | >Seen as unknown | >Wrong name | Wrong names | "
+            "Relatives named"
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption="A relative's best-fitted signature can't be told from the unknown: its name is not wrong.",
     )
 
@@ -252,20 +234,13 @@ def _worst(cases: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
 
 def _gates(gates: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
-        columns=(
-            ("Gate", "", "text"),
-            ("Limit", "", "figure"),
-            ("Reached", "", "figure"),
-            ("Outcome", "", "text"),
-        ),
-        rows=tuple(
-            Row(
-                (
-                    one["key"],
-                    f"{'≥' if one['at_least'] else '≤'} {stated(one['limit'])}",
-                    number(one["value"]),
-                    "✓ met" if one["met"] else "✗ not met",
-                )
+        columns=columns_of("Gate | >Limit | >Reached | Outcome"),
+        rows=(
+            (
+                one["key"],
+                f"{'≥' if one['at_least'] else '≤'} {stated(one['limit'])}",
+                number(one["value"]),
+                "✓ met" if one["met"] else "✗ not met",
             )
             for one in gates
         ),
@@ -274,15 +249,9 @@ def _gates(gates: Sequence[Mapping[str, Any]]) -> Table:
 
 def _uses(uses: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
-        columns=(
-            ("When", "UTC", "text"),
-            ("Seed", "", "figure"),
-            ("Cases", "", "figure"),
-            ("Methods", "", "text"),
-            ("Hash of the truth", "first digits", "text"),
-        ),
-        rows=tuple(
-            Row((u["when"], str(u["seed"]), str(u["cases"]), listed(list(u["figures"]), 9), u["truth"][:12]))
+        columns=columns_of("When [UTC] | >Seed | >Cases | Methods | Hash of the truth [first digits]"),
+        rows=(
+            (u["when"], str(u["seed"]), str(u["cases"]), listed(list(u["figures"]), 9), u["truth"][:12])
             for u in uses
         ),
         caption="Every use of a final seed so far. A seed that was used once is no longer fresh.",
@@ -291,22 +260,14 @@ def _uses(uses: Sequence[Mapping[str, Any]]) -> Table:
 
 def _parts(parts: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
-        columns=(
-            ("Marks", "", "text"),
-            ("Cases", "", "figure"),
-            ("Numbers", "", "figure"),
-            ("Kinds", "", "text"),
-            ("Hash of the truth", "first digits", "text"),
-        ),
-        rows=tuple(
-            Row(
-                (
-                    part["file"],
-                    str(part["cases"]),
-                    f"{part['first']} … {part['last']}",
-                    ", ".join(f"{kind_words(kind)} {n}" for kind, n in part["kinds"].items()),
-                    part["truth"][:12],
-                )
+        columns=columns_of("Marks | >Cases | >Numbers | Kinds | Hash of the truth [first digits]"),
+        rows=(
+            (
+                part["file"],
+                str(part["cases"]),
+                f"{part['first']} … {part['last']}",
+                ", ".join(f"{kind_words(kind)} {n}" for kind, n in part["kinds"].items()),
+                part["truth"][:12],
             )
             for part in parts
         ),

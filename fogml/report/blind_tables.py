@@ -11,7 +11,7 @@ from fogml.blind.folders import DIAGNOSIS
 from fogml.blind.methods import ABSTAIN, BASELINES
 from fogml.report import style
 from fogml.report.page import Drawing
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.words import MISSING, number, percent, stated
 
 _KINDS = {
@@ -124,14 +124,10 @@ def by_reality_table(parts: Mapping[str, Sequence[Mapping[str, Any]]]) -> Table:
     rows = []
     for place, row in enumerate(parts[names[0]]):
         cells = (_cell(parts[name][place]) for name in names)
-        rows.append(Row((row["words"], wanted_text(row), *cells)))
+        rows.append((row["words"], wanted_text(row), *cells))
     return Table(
-        columns=(
-            ("Figure", "", "text"),
-            ("Wanted", "", "figure"),
-            *((n, "95 % interval; n", "figure") for n in names),
-        ),
-        rows=tuple(rows),
+        columns=(*columns_of("Figure | >Wanted"), *((n, "95 % interval; n", "figure") for n in names)),
+        rows=rows,
         caption="n is what a figure rests on. Probability from one half on is a name; a far form that is "
         "called by its name is right, called unknown it is a miss.",
     )
@@ -150,18 +146,13 @@ def by_form_table(cells: Sequence[Mapping[str, Any]]) -> Table:
         low, high = cell["d_prime"]
         told = (value_text(cell[key]["value"], "percent") for key in _SHOWN)
         window = f"{number(low)}–{number(high)}"
-        rows.append(Row((cell["reality"], cell["form"] or MISSING, window, str(cell["right"]["n"]), *told)))
+        rows.append((cell["reality"], cell["form"] or MISSING, window, str(cell["right"]["n"]), *told))
     return Table(
-        columns=(
-            ("Reality", "", "text"),
-            ("Cosine", "of the catalogue's best member", "figure"),
-            ("d′", "", "figure"),
-            ("Cases", "", "figure"),
-            ("Class right", "", "figure"),
-            ("Exact", "", "figure"),
-            ("Called unknown", "", "figure"),
+        columns=columns_of(
+            "Reality | >Cosine [of the catalogue's best member] | >d′ | >Cases | >Class right | "
+            ">Exact | >Called unknown"
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption="Cosine of a true effect with the nearest member of the catalogue's form, beside the nominal "
         "constants and after whitening.",
     )

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from fogml.report import style
 from fogml.report.page import render
 from fogml.report.style import time_unit
-from fogml.report.tables import Row, Table, reference_of
+from fogml.report.tables import Table, columns_of, reference_of
 from fogml.report.verdict import (
     advice_words,
     floor_told,
@@ -147,19 +147,16 @@ def _sheet(judgement: Judgement) -> Sheet:
 
 def _runs(runs: Sequence[RunJudgement]) -> Table:
     """The figures after per run, narrow enough for a page."""
-    columns = [("Run", "", "text"), ("Rms before", "deg/h", "figure"), ("Rms after", "deg/h", "figure")]
-    columns += [
-        ("Bias", "deg/h", "figure"),
-        ("Bias stability over temperature", "deg/h", "figure"),
-        ("Range", "deg/h", "figure"),
-    ]
-    columns += [("Noise floor", "deg/h", "figure"), ("Outside training", "", "figure")]
+    columns = columns_of(
+        "Run | >Rms before [deg/h] | >Rms after [deg/h] | >Bias [deg/h] | "
+        ">Bias stability over temperature [deg/h] | >Range [deg/h] | >Noise floor [deg/h] | >Outside training"
+    )
     rows = []
     for run in runs:
         values = (run.before.rms, run.after.rms, run.after.bias, run.after.bias_stability, run.after.range)
         cells = (run.run, *(number(value) for value in (*values, run.floor)), percent(run.outside_training))
-        rows.append(Row(cells))
-    return Table(tuple(columns), tuple(rows))
+        rows.append(cells)
+    return Table(columns, rows)
 
 
 def is_synthetic(judgement: Judgement) -> bool:
@@ -172,7 +169,7 @@ def _figures(run: RunJudgement) -> Table:
     rows = []
 
     def add(name: str, value: str, interval: str, how: str) -> None:
-        rows.append(Row((name, value, interval, how)))
+        rows.append((name, value, interval, how))
 
     few = "fewer than three averages"
     for name, found, how, without in (
@@ -202,8 +199,7 @@ def _figures(run: RunJudgement) -> Table:
             ends = term.get("ci") or (None,)
             told = "" if None in ends else " to ".join(number(end) for end in ends)
             add(_TERMS[name], f"{number(term['value'])} {term['unit']}", told, "Allan deviation of the run")
-    names = (("Figure", "text"), ("Value", "figure"), ("90 % interval", "figure"), ("Of", "text"))
-    return Table(tuple((name, "", kind) for name, kind in names), tuple(rows))
+    return Table(columns_of("Figure | >Value | >90 % interval | Of"), rows)
 
 
 def _attitude(run: RunJudgement) -> str:

@@ -12,7 +12,7 @@ from plotly.subplots import make_subplots
 from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.style import log_axis, segments_of, shade, time_unit
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Row, Table, columns_of
 from fogml.report.verdict import floor_told, own_noise, stated_limits, unseen, worst_run
 from fogml.report.words import MISSING, averages, listed, number, percent
 from fogml.signals.drawn import drawn, gap_starts
@@ -124,25 +124,17 @@ def _table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
         mark = "chosen" if name == CHOOSER else "baseline" if name in BASELINES else ""
         rows.append(Row(tuple(cells), mark))
     worst = worst_run(judgements[order[0]].test)
-    columns = [
-        ("Model", "", "text"),
-        ("Rms", "deg/h", "figure"),
-        ("Rms over floor", "", "figure"),
-        ("Bias", "deg/h", "figure"),
-        ("Bias stability", "deg/h", "figure"),
-        ("Range", "deg/h", "figure"),
-        ("Outside training", "", "figure"),
-        ("Parameters", "", "figure"),
-        ("Weights", "byte", "figure"),
-    ]
-    if with_limits:
-        columns.append(("Limits", "", "text"))
+    columns = columns_of(
+        "Model | >Rms [deg/h] | >Rms over floor | >Bias [deg/h] | >Bias stability [deg/h] | "
+        ">Range [deg/h] | >Outside training | >Parameters | >Weights [byte]"
+        + (" | Limits" if with_limits else "")
+    )
     several = (
         ", the worst test run of each model" if len(judgements[order[0]].test) > 1 else f" on {worst.run}"
     )
     return Table(
-        tuple(columns),
-        tuple(rows),
+        columns,
+        rows,
         f"What is left{several}, {averages(worst.averaging_s)}. Noise floor {number(worst.floor)} deg/h.",
     )
 
@@ -155,8 +147,8 @@ def _runs_table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
         cells = (name, *(number(by_run.get(run.run)) for run in runs))
         rows.append(Row(cells, "chosen" if name == CHOOSER else ""))
     return Table(
-        (("Model", "", "text"), *((run.run, "deg/h", "figure") for run in runs)),
-        tuple(rows),
+        (*columns_of("Model"), *((run.run, "deg/h", "figure") for run in runs)),
+        rows,
         f"Rms after on each test run, {averages(runs[0].averaging_s)}.",
     )
 

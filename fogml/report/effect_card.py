@@ -12,7 +12,7 @@ from markupsafe import Markup
 from fogml.arrays import FloatArray
 from fogml.report import style
 from fogml.report.page import render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.words import number
 from fogml.signals.drawn import min_max_indices
 from fogml.static_svg import Curve, line_figure
@@ -100,19 +100,16 @@ def allan_figure(curve: AllanCurve | None) -> Markup:
 def quantities_table(card: Mapping[str, Any]) -> Table:
     """Amplitude and shape parameters with their units and ranges."""
     rows = [
-        Row(
-            (
-                quantity["name"].replace("_", " "),
-                quantity["meaning"],
-                quantity["unit"],
-                _range(quantity, "tactical"),
-                _range(quantity, "navigation"),
-            )
+        (
+            quantity["name"].replace("_", " "),
+            quantity["meaning"],
+            quantity["unit"],
+            _range(quantity, "tactical"),
+            _range(quantity, "navigation"),
         )
         for quantity in (card["amplitude"], *card["shape"])
     ]
-    heads = (("Parameter", "", "text"), ("Meaning", "", "text"), ("Unit", "", "text"))
-    return Table((*heads, ("Tactical", "", "figure"), ("Navigation", "", "figure")), tuple(rows))
+    return Table(columns_of("Parameter | Meaning | Unit | >Tactical | >Navigation"), rows)
 
 
 def about(card: Mapping[str, Any]) -> list[tuple[str, str]]:

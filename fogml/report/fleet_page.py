@@ -14,7 +14,7 @@ from fogml.fleet.tasks import DONE
 from fogml.report import style
 from fogml.report.figures_fleet import by_unit, constants, distribution
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Row, Table, columns_of
 from fogml.report.words import MISSING, averages, listed, number, percent, plural
 
 _PAGES = {
@@ -124,26 +124,20 @@ def _trends(fleet: Mapping[str, Any]) -> Table:
     rows = []
     for place, trend in enumerate(found["trends"]):
         rows.append(
-            Row(
-                (
-                    "constant" if trend["name"] == "1" else trend["name"],
-                    number(found["mean"][place]),
-                    number(found["std"][place]),
-                    number(trend["per_unit"]),
-                    number(trend["probability"], 2),
-                    "drift seen" if trend["seen"] else "none seen",
-                )
+            (
+                "constant" if trend["name"] == "1" else trend["name"],
+                number(found["mean"][place]),
+                number(found["std"][place]),
+                number(trend["per_unit"]),
+                number(trend["probability"], 2),
+                "drift seen" if trend["seen"] else "none seen",
             )
         )
-    columns = (
-        ("Constant", "", "text"),
-        ("Fleet mean", "deg/h per unit of the term", "figure"),
-        ("Between units, 1 σ", "", "figure"),
-        ("Per serial number", "", "figure"),
-        ("Probability by chance", "", "figure"),
-        ("Trend", "", "text"),
+    columns = columns_of(
+        "Constant | >Fleet mean [deg/h per unit of the term] | >Between units, 1 σ | "
+        ">Per serial number | >Probability by chance | Trend"
     )
-    return Table(columns, tuple(rows), "Slope by Theil and Sen, probability by Kendall's rank correlation.")
+    return Table(columns, rows, "Slope by Theil and Sen, probability by Kendall's rank correlation.")
 
 
 def _table(order: list[Mapping[str, Any]]) -> Table:
@@ -174,17 +168,11 @@ def _table(order: list[Mapping[str, Any]]) -> Table:
                 ),
             )
         )
-    columns = (
-        ("Unit", "", "text"),
-        ("Job", "", "text"),
-        ("Status", "", "text"),
-        ("Rms before", "deg/h", "figure"),
-        ("Rms after", "deg/h", "figure"),
-        ("Floor", "deg/h", "figure"),
-        ("Outside training", "", "figure"),
-        ("Model, verdict or reason", "", "text"),
+    columns = columns_of(
+        "Unit | Job | Status | >Rms before [deg/h] | >Rms after [deg/h] | >Floor [deg/h] | "
+        ">Outside training | Model, verdict or reason"
     )
-    return Table(columns, tuple(rows), "Every unit, its worst test run.", sortable=True)
+    return Table(columns, rows, "Every unit, its worst test run.", sortable=True)
 
 
 def _status(unit: Mapping[str, Any]) -> str:
@@ -254,22 +242,17 @@ def line_table(line: Mapping[str, Any]) -> Table:
             number(cause["gap_rms_without"]),
             cause["place"],
         )
-        rows.append(Row(cells))
-    columns = (
-        ("Cause", "", "text"),
-        ("Shared", "", "text"),
-        ("Units that have it", "of those that could show it", "text"),
-        ("Share of the line", "90 %", "text"),
-        ("Size", "", "text"),
-        ("Of the line's gap", "90 %", "text"),
-        ("Gap without it", "deg/h rms", "figure"),
-        ("Place", "", "text"),
+        rows.append(cells)
+    columns = columns_of(
+        "Cause | Shared | Units that have it [of those that could show it] | "
+        "Share of the line [90 %] | Size | Of the line's gap [90 %] | "
+        ">Gap without it [deg/h rms] | Place"
     )
     others = len(line["causes"]) - len(rows)
     more = (
         f" {plural(others, 'more is', 'more are')} hinted at and named in none: fleet.json." if others else ""
     )
-    return Table(columns, tuple(rows), f"Causes of the line, what makes most of its gap first.{more}")
+    return Table(columns, rows, f"Causes of the line, what makes most of its gap first.{more}")
 
 
 def line_figure(line: Mapping[str, Any]) -> Drawing:

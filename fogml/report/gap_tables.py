@@ -18,7 +18,7 @@ from fogml.report.gap_words import (
     with_error,
 )
 from fogml.report.style import regime_word
-from fogml.report.tables import Column, Row, Table
+from fogml.report.tables import Row, Table, columns_of
 from fogml.report.words import MISSING, averages, duration, number, percent
 from fogml.twin.registry import effects
 
@@ -66,19 +66,12 @@ def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     if not rows:
         return None
     return Table(
-        columns=(
-            ("Effect", "", "text"),
-            ("Probability", "", "figure"),
-            ("Amplitude", "± standard error", "figure"),
-            ("Unit", "", "text"),
-            ("Size", "of the usual most", "figure"),
-            ("Of the gap", "share", "figure"),
-            ("Look at", "", "text"),
-            ("Shape", "± standard error", "text"),
-            ("Can't be told from", "", "text"),
-            ("On the runs", "", "text"),
+        columns=columns_of(
+            "Effect | >Probability | >Amplitude [± standard error] | Unit | "
+            ">Size [of the usual most] | >Of the gap [share] | Look at | Shape [± standard error] | "
+            "Can't be told from | On the runs"
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption="Highlighted: named. The probability is that one of its class acts; amplitude and shape are "
         "of the effect that stands for the class. Suspected: likely, and not sure enough for a name.",
     )
@@ -113,27 +106,22 @@ def classes_table(found: Sequence[Found], names: dict[str, str]) -> Table | None
                     told.append(catalogue[a].confused_with[b])
             # The two cards often say the same of each other.
             separates = "; or: ".join(dict.fromkeys(told)) or "the cards name no simple test"
-            rows.append(Row((title_of(first, names), title_of(second, names), separates)))
+            rows.append((title_of(first, names), title_of(second, names), separates))
     if not rows:
         return None
     return Table(
-        columns=(("These", "", "text"), ("look alike here", "", "text"), ("What separates them", "", "text")),
-        rows=tuple(rows),
+        columns=columns_of("These | look alike here | What separates them"),
+        rows=rows,
     )
 
 
 def how_far_table(found: Diagnosis) -> Table:
     """Rms on each held-out run and what is closed of the structural gap."""
     named = bool(found.named)
-    columns: list[Column] = [
-        ("Held out", "", "text"),
-        ("Nominal", "deg/h", "figure"),
-        ("Recalibrated", "deg/h", "figure"),
-        ("With what was found", "deg/h", "figure"),
-        ("Noise floor", "deg/h", "figure"),
-        ("Closed", "", "figure"),
-        ("90 % interval", "", "figure"),
-    ]
+    columns = columns_of(
+        "Held out | >Nominal [deg/h] | >Recalibrated [deg/h] | >With what was found [deg/h] | "
+        ">Noise floor [deg/h] | >Closed | >90 % interval"
+    )
     rows = []
     for item in found.how_far:
         cells = [
@@ -142,10 +130,10 @@ def how_far_table(found: Diagnosis) -> Table:
             closed_words(item),
             interval_words(*item.closed_ci90) if item.closed_ci90 else MISSING,
         ]
-        rows.append(Row(tuple(cells if named else cells[:3] + cells[4:5])))
+        rows.append(tuple(cells if named else cells[:3] + cells[4:5]))
     return Table(
-        columns=tuple(columns if named else columns[:3] + columns[4:5]),
-        rows=tuple(rows),
+        columns=columns if named else columns[:3] + columns[4:5],
+        rows=rows,
         caption=f"Rms of {averages(found.how_far[0].averaging_s)} of recorded less replayed."
         + (
             " Closed: the part of recalibrated² − floor² that goes; above 100 % or below 0 is chance "
@@ -164,22 +152,14 @@ def segments_table(found: Diagnosis) -> Table | None:
     kept = sorted(segments[:MOST_SEGMENTS], key=lambda s: (s.run, s.from_s))
     more = len(segments) - len(kept)
     return Table(
-        columns=(
-            ("Run", "", "text"),
-            ("From", "s", "figure"),
-            ("To", "s", "figure"),
-            ("Lasts", "", "figure"),
-            ("Excess rms", "deg/h", "figure"),
-        ),
-        rows=tuple(
-            Row(
-                (
-                    s.run,
-                    f"{max(s.from_s, 0.0):.0f}",
-                    f"{s.to_s:.0f}",
-                    duration(s.to_s - s.from_s),
-                    number(s.excess_rms),
-                )
+        columns=columns_of("Run | >From [s] | >To [s] | >Lasts | >Excess rms [deg/h]"),
+        rows=(
+            (
+                s.run,
+                f"{max(s.from_s, 0.0):.0f}",
+                f"{s.to_s:.0f}",
+                duration(s.to_s - s.from_s),
+                number(s.excess_rms),
             )
             for s in kept
         ),
@@ -195,43 +175,29 @@ def regimes_table(found: Diagnosis) -> Table:
         low, high = s.excess_rms_ci90 or (None, None)
         part = interval_words(*s.share_ci90) if s.share_ci90 else MISSING
         rows.append(
-            Row(
-                (
-                    regime_word(s.name),
-                    number(s.excess_rms),
-                    f"{number(low)} … {number(high)}",
-                    percent(s.share),
-                    part,
-                )
+            (
+                regime_word(s.name),
+                number(s.excess_rms),
+                f"{number(low)} … {number(high)}",
+                percent(s.share),
+                part,
             )
         )
     return Table(
-        columns=(
-            ("Regime", "", "text"),
-            ("Excess rms", "deg/h", "figure"),
-            ("90 % interval", "deg/h", "figure"),
-            ("Share", "", "figure"),
-            ("90 % interval", "", "figure"),
-        ),
-        rows=tuple(rows),
+        columns=columns_of("Regime | >Excess rms [deg/h] | >90 % interval [deg/h] | >Share | >90 % interval"),
+        rows=rows,
     )
 
 
 def alternatives_table(alternatives: Sequence[Mapping[str, Any]]) -> Table:
     """Other programmes that were weighed as the next run."""
     return Table(
-        columns=(
-            ("Programme", "", "text"),
-            ("Lasts", "", "figure"),
-            ("Expected distance", "", "figure"),
-        ),
-        rows=tuple(
-            Row(
-                (
-                    str(other.get("summary") or other.get("programme") or MISSING),
-                    duration(3600.0 * other["hours"]) if "hours" in other else MISSING,
-                    number(other.get("distance"), 2),
-                )
+        columns=columns_of("Programme | >Lasts | >Expected distance"),
+        rows=(
+            (
+                str(other.get("summary") or other.get("programme") or MISSING),
+                duration(3600.0 * other["hours"]) if "hours" in other else MISSING,
+                number(other.get("distance"), 2),
             )
             for other in alternatives
         ),
@@ -241,26 +207,18 @@ def alternatives_table(alternatives: Sequence[Mapping[str, Any]]) -> Table:
 def constants_table(found: Diagnosis) -> Table:
     """Prior and fitted value of each constant."""
     rows = [
-        Row(
-            (
-                f"{c.name}: {_CONSTANTS[c.name]}" if c.name in _CONSTANTS else c.name,
-                f"{number(c.prior_mean)} ± {number(c.prior_sd, 2)}",
-                with_error(c.value, c.se),
-                unit_words(c.unit),
-                percent(1.0 - min(c.se / c.prior_sd, 1.0)) if c.prior_sd > 0.0 else MISSING,
-            )
+        (
+            f"{c.name}: {_CONSTANTS[c.name]}" if c.name in _CONSTANTS else c.name,
+            f"{number(c.prior_mean)} ± {number(c.prior_sd, 2)}",
+            with_error(c.value, c.se),
+            unit_words(c.unit),
+            percent(1.0 - min(c.se / c.prior_sd, 1.0)) if c.prior_sd > 0.0 else MISSING,
         )
         for c in found.constants
     ]
     return Table(
-        columns=(
-            ("Constant", "", "text"),
-            ("Prior", "± sd", "figure"),
-            ("Fitted", "± se", "figure"),
-            ("Unit", "", "text"),
-            ("Learnt", "", "figure"),
-        ),
-        rows=tuple(rows),
+        columns=columns_of("Constant | >Prior [± sd] | >Fitted [± se] | Unit | >Learnt"),
+        rows=rows,
         caption="Learnt: by how much the runs narrowed the prior.",
     )
 
@@ -271,32 +229,20 @@ def noise_table(found: Diagnosis) -> Table:
     for name, value in found.noise.coefficients.items():
         words, unit = _NOISE.get(name, (name, ""))
         spread = found.noise.relative_se.get(name)
-        rows.append(
-            Row((f"{name}, {words}", number(value), MISSING if spread is None else percent(spread), unit))
-        )
+        rows.append((f"{name}, {words}", number(value), MISSING if spread is None else percent(spread), unit))
     return Table(
-        columns=(
-            ("Coefficient", "", "text"),
-            ("Value", "", "figure"),
-            ("Standard error", "", "figure"),
-            ("Unit", "", "text"),
-        ),
-        rows=tuple(rows),
+        columns=columns_of("Coefficient | >Value | >Standard error | Unit"),
+        rows=rows,
     )
 
 
 def evidence_table(found: Diagnosis) -> Table:
     """Every candidate, the largest gain first."""
     return Table(
-        columns=(
-            ("Candidate", "", "text"),
-            ("Stage", "", "text"),
-            ("Gain alone", "nats", "figure"),
-            ("Probability", "", "figure"),
-            ("Length at usual size", "", "figure"),
-            ("Outcome", "", "text"),
+        columns=columns_of(
+            "Candidate | Stage | >Gain alone [nats] | >Probability | >Length at usual size | Outcome"
         ),
-        rows=tuple(
+        rows=(
             Row(
                 (
                     f"{e.title} ({e.effect})",

@@ -8,7 +8,7 @@ from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import CauseShare, Rehearsed, WhatIf
 from fogml.report.gap_words import interval_words, probability_words, title_of
 from fogml.report.style import regime_word
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.words import MISSING, averages, number, percent
 
 MOST_ROWS = 20
@@ -21,16 +21,11 @@ def nearest_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     if not found.nearest or found.verdict == "no_gap":
         return None
     rows = [
-        Row((title_of(n.effect, names), percent(n.share), probability_words(n.probability)))
-        for n in found.nearest
+        (title_of(n.effect, names), percent(n.share), probability_words(n.probability)) for n in found.nearest
     ]
     return Table(
-        columns=(
-            ("Known cause", "", "text"),
-            ("Of the fit runs' gap", "", "figure"),
-            ("Probability", "", "figure"),
-        ),
-        rows=tuple(rows),
+        columns=columns_of("Known cause | >Of the fit runs' gap | >Probability"),
+        rows=rows,
         caption="What each holds alone, in whatever form its family has: it is no name.",
     )
 
@@ -47,13 +42,13 @@ def shares_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     for (run, regime), held in groups.items():
         where = run or (regime_word(regime) if regime else "in all")
         cells = [f"{percent(held[c].share)} ({interval_words(*held[c].ci90)})" for c in causes]
-        rows.append(Row((where, *cells)))
+        rows.append((where, *cells))
     return Table(
         columns=(
-            ("Run or regime", "", "text"),
+            *columns_of("Run or regime"),
             *((_cause(c, names), "90 % interval", "figure") for c in causes),
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption="Of what all causes of the likeliest set together take away of the gap's energy, named or "
         "not. Where causes cancel, one may have less than none.",
     )
@@ -70,32 +65,25 @@ def what_if_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     ranked = sorted(found.what_if, key=lambda w: (len(w.beside), -w.share))
     rows = [_what_if(w, names) for w in ranked[:MOST_ROWS]]
     return Table(
-        columns=(
-            ("Candidate", "", "text"),
-            ("Beside", "", "text"),
-            ("Of the fit runs' gap", "", "figure"),
-            ("Run", "held out", "text"),
-            ("After", "deg/h", "figure"),
-            ("Closed", "", "figure"),
-            ("90 % interval", "", "text"),
+        columns=columns_of(
+            "Candidate | Beside | >Of the fit runs' gap | Run [held out] | >After [deg/h] | "
+            ">Closed | 90 % interval"
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption="Each candidate in whatever form its family has, fitted alone or beside what is named. Those "
         f"that hold most of the gap, at most {MOST_ROWS}; gap.json has all.",
     )
 
 
-def _what_if(w: WhatIf, names: dict[str, str]) -> Row:
-    return Row(
-        (
-            title_of(w.effect, names),
-            "; ".join(title_of(b, names) for b in w.beside) or MISSING,
-            percent(w.share),
-            w.run,
-            number(w.after),
-            percent(w.closed),
-            MISSING if w.closed_ci90 is None else interval_words(*w.closed_ci90),
-        )
+def _what_if(w: WhatIf, names: dict[str, str]) -> tuple[str, ...]:
+    return (
+        title_of(w.effect, names),
+        "; ".join(title_of(b, names) for b in w.beside) or MISSING,
+        percent(w.share),
+        w.run,
+        number(w.after),
+        percent(w.closed),
+        MISSING if w.closed_ci90 is None else interval_words(*w.closed_ci90),
     )
 
 
@@ -104,32 +92,25 @@ def rehearsal_table(rehearsal: Sequence[Rehearsed], names: dict[str, str]) -> Ta
     if not rehearsal:
         return None
     return Table(
-        columns=(
-            ("If this acted", "", "text"),
-            ("Shape", "", "text"),
-            ("Size", "", "text"),
-            ("Shows", "noise lengths", "figure"),
-            ("It would be", "", "text"),
-            ("Probability", "", "figure"),
+        columns=columns_of(
+            "If this acted | Shape | Size | >Shows [noise lengths] | It would be | >Probability"
         ),
-        rows=tuple(_rehearsed(r, names) for r in _worst_first(rehearsal)),
+        rows=(_rehearsed(r, names) for r in _worst_first(rehearsal)),
         caption="Each candidate is put into replays of these runs, without noise, and judged by the "
         "evidence of one cause. Under a length of 3 nothing can be told.",
     )
 
 
-def _rehearsed(r: Rehearsed, names: dict[str, str]) -> Row:
+def _rehearsed(r: Rehearsed, names: dict[str, str]) -> tuple[str, ...]:
     titles = " or ".join(title_of(m, names) for m in r.named_as)
     outcome = {"missed": "missed", "mistaken": f"mistaken for {titles}", "named": f"named {titles}"}
-    return Row(
-        (
-            title_of(r.effect, names),
-            _FORMS[r.form],
-            _SIZES[r.size],
-            number(r.length),
-            outcome[r.outcome],
-            probability_words(r.probability),
-        )
+    return (
+        title_of(r.effect, names),
+        _FORMS[r.form],
+        _SIZES[r.size],
+        number(r.length),
+        outcome[r.outcome],
+        probability_words(r.probability),
     )
 
 
@@ -145,16 +126,12 @@ def compensation_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
         return None
     causes = " and ".join(title_of(c.effect, names) for c in told.counted) or "no cause"
     return Table(
-        columns=(
-            ("Run", "", "text"),
-            ("Before", "deg/h", "figure"),
-            ("The twin's constants", "deg/h", "figure"),
-            ("With the causes", "deg/h", "figure"),
-            ("Noise floor", "deg/h", "figure"),
+        columns=columns_of(
+            "Run | >Before [deg/h] | >The twin's constants [deg/h] | >With the causes [deg/h] | "
+            ">Noise floor [deg/h]"
         ),
-        rows=tuple(
-            Row((b.run, *(number(v) for v in (b.before, b.constants, b.after, b.floor))))
-            for b in told.held_out
+        rows=(
+            (b.run, *(number(v) for v in (b.before, b.constants, b.after, b.floor))) for b in told.held_out
         ),
         caption=f"Rms of {averages(told.held_out[0].averaging_s)}, compensated by what the unit itself knows "
         f"in service; causes: {causes}.",

@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 from fogml.arrays import FloatArray
 from fogml.report import style
 from fogml.report.page import Drawing, render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.verdict import advice_words, worst_run
 from fogml.report.words import MISSING, averages, listed, number
 from fogml.signals.drawn import DRAWN_POINTS, min_max_indices
@@ -119,33 +119,29 @@ def _table(
             for by_axis in beside.values()
         ]
         rows.append(
-            Row(
-                (
-                    f"axis {axis}",
-                    str(judgement.model.get("kind")),
-                    number(worst.before.rms),
-                    *others,
-                    number(worst.after.rms),
-                    number(worst.after.bias_stability),
-                    number(worst.floor),
-                    number(loop.rms) if loop else MISSING,
-                )
+            (
+                f"axis {axis}",
+                str(judgement.model.get("kind")),
+                number(worst.before.rms),
+                *others,
+                number(worst.after.rms),
+                number(worst.after.bias_stability),
+                number(worst.floor),
+                number(loop.rms) if loop else MISSING,
             )
         )
     test = next(iter(judgements.values())).test[0]
     tests = listed([run.run for judgement in judgements.values() for run in judgement.test], 6)
     return Table(
         (
-            ("Axis", "", "text"),
-            ("Model", "", "text"),
-            ("Rms before", "deg/h", "figure"),
+            *columns_of("Axis | Model | >Rms before [deg/h]"),
             *((f"Rms, {name}", "deg/h", "figure") for name in beside),
-            ("Rms after", "deg/h", "figure"),
-            ("Bias stability after", "deg/h", "figure"),
-            ("Noise floor", "deg/h", "figure"),
-            ("Distance of the runs at equal T, rms", "deg/h", "figure"),
+            *columns_of(
+                ">Rms after [deg/h] | >Bias stability after [deg/h] | >Noise floor [deg/h] | "
+                ">Distance of the runs at equal T, rms [deg/h]"
+            ),
         ),
-        tuple(rows),
+        rows,
         f"On {tests}, {averages(test.averaging_s)}.",
     )
 

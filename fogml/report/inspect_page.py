@@ -14,7 +14,7 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import Segment, in_order, regime_word, rounded_up, shade, time_unit
-from fogml.report.tables import Noticed, Row, Table, noticed
+from fogml.report.tables import Noticed, Table, columns_of, noticed
 from fogml.report.words import MISSING, duration, listed, number, percent, plural, stated
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
@@ -135,27 +135,17 @@ def _tiles(told: Mapping[str, Any]) -> list[Tile]:
 
 def _columns(told: Mapping[str, Any]) -> Table:
     rows = [
-        Row(
-            (
-                column["name"],
-                column["unit"] or MISSING,
-                *(number(column[key], 4) for key in ("least", "greatest", "mean", "standard_deviation")),
-                column["meaning"],
-            )
+        (
+            column["name"],
+            column["unit"] or MISSING,
+            *(number(column[key], 4) for key in ("least", "greatest", "mean", "standard_deviation")),
+            column["meaning"],
         )
         for column in told["columns"]
     ]
     return Table(
-        (
-            ("Column", "", "text"),
-            ("Unit", "", "text"),
-            ("Least", "", "figure"),
-            ("Greatest", "", "figure"),
-            ("Mean", "", "figure"),
-            ("Standard deviation", "", "figure"),
-            ("What it is", "", "text"),
-        ),
-        tuple(rows),
+        columns_of("Column | Unit | >Least | >Greatest | >Mean | >Standard deviation | What it is"),
+        rows,
     )
 
 
@@ -163,14 +153,7 @@ def _regimes(segments: Sequence[Mapping[str, Any]]) -> Table | None:
     if not segments:
         return None
     with_temperature = "temperature_from" in segments[0]
-    columns = [
-        ("Regime", "", "text"),
-        ("From", "s", "figure"),
-        ("To", "s", "figure"),
-        ("Lasts", "", "figure"),
-    ]
-    if with_temperature:
-        columns += [("T from", "°C", "figure"), ("T to", "°C", "figure"), ("T mean", "°C", "figure")]
+    temperatures = " | >T from [°C] | >T to [°C] | >T mean [°C]" if with_temperature else ""
     rows = []
     for segment in segments:
         cells = [
@@ -181,19 +164,17 @@ def _regimes(segments: Sequence[Mapping[str, Any]]) -> Table | None:
         ]
         if with_temperature:
             cells += [number(segment[f"temperature_{end}"], 4) for end in ("from", "to", "mean")]
-        rows.append(Row(tuple(cells)))
-    return Table(tuple(columns), tuple(rows))
+        rows.append(tuple(cells))
+    return Table(columns_of(f"Regime | >From [s] | >To [s] | >Lasts{temperatures}"), rows)
 
 
 def _gaps(gaps: Sequence[Mapping[str, Any]]) -> Table | None:
     if not gaps:
         return None
-    rows = [
-        Row((str(gap["row"]), stated(round(gap["after_s"], 3)), duration(gap["length_s"]))) for gap in gaps
-    ]
+    rows = [(str(gap["row"]), stated(round(gap["after_s"], 3)), duration(gap["length_s"])) for gap in gaps]
     return Table(
-        (("First row after the gap", "", "figure"), ("Begins after", "s", "figure"), ("Lasts", "", "figure")),
-        tuple(rows),
+        columns_of(">First row after the gap | >Begins after [s] | >Lasts"),
+        rows,
     )
 
 

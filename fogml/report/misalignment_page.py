@@ -11,7 +11,7 @@ from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Row, Table, columns_of
 from fogml.report.words import MISSING, listed, number, plural, stated
 
 
@@ -79,21 +79,13 @@ def _result(values: Mapping[str, Any]) -> Table:
     ):
         ends = intervals.get(key)
         span = f"{number(ends[0], 7)} … {number(ends[1], 7)}" if ends else MISSING
-        rows.append(Row((label, number(values[key], 8), number(se.get(key)), span, unit)))
+        rows.append((label, number(values[key], 8), number(se.get(key)), span, unit))
     errors = se.get("fixture_error_deg") or [None, None]
     for axis, value, error in zip("xy", values["fixture_error_deg"], errors):
-        rows.append(
-            Row((f"Zero error of the fixture, {axis}", number(value, 5), number(error), MISSING, "deg"))
-        )
+        rows.append((f"Zero error of the fixture, {axis}", number(value, 5), number(error), MISSING, "deg"))
     return Table(
-        columns=(
-            ("Quantity", "", "text"),
-            ("Value", "", "figure"),
-            ("Standard error", "", "figure"),
-            (f"{values['level']:.0%} interval", "", "figure"),
-            ("Unit", "", "text"),
-        ),
-        rows=tuple(rows),
+        columns=columns_of(f"Quantity | >Value | >Standard error | >{values['level']:.0%} interval | Unit"),
+        rows=rows,
         caption="The interval of the whole angle is what the joint region of both components spans.",
     )
 
@@ -114,15 +106,10 @@ def _methods(values: Mapping[str, Any]) -> Table:
         for method in values["methods"]
     ]
     return Table(
-        columns=(
-            ("Method", "", "text"),
-            ("K", values["unit"], "figure"),
-            ("less four states", "ppm", "figure"),
-            ("x", "deg", "figure"),
-            ("y", "deg", "figure"),
-            ("How", "", "text"),
+        columns=columns_of(
+            f"Method | >K [{values['unit']}] | >less four states [ppm] | >x [deg] | >y [deg] | How"
         ),
-        rows=tuple(rows),
+        rows=rows,
     )
 
 

@@ -20,7 +20,7 @@ from fogml.report.monitor_words import (
     unit_label,
 )
 from fogml.report.page import Tile, render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.words import number, percent, plural
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
@@ -124,24 +124,17 @@ def _verdict(unit: Mapping[str, Any]) -> list[str]:
 
 def _table(unit: Mapping[str, Any]) -> Table:
     rows = [
-        Row(
-            (
-                run["run"],
-                (run["started"] or "–")[:16].replace("T", " "),
-                *(number(shown_figure(run, name)) for name in FIGURE_WORDS),
-                percent(run["outside_training"]),
-            )
+        (
+            run["run"],
+            (run["started"] or "–")[:16].replace("T", " "),
+            *(number(shown_figure(run, name)) for name in FIGURE_WORDS),
+            percent(run["outside_training"]),
         )
         for run in unit["runs"]
     ]
-    columns = (
-        ("Run", "", "text"),
-        ("Began", "", "text"),
-        ("Bias", "deg/h", "figure"),
-        ("Slope, temperature", "deg/h/°C", "figure"),
-        ("Slope, rate", "deg/h/(°C/min)", "figure"),
-        ("Scatter", "deg/h", "figure"),
-        ("Scale factor error", "ppm", "figure"),
-        ("Outside training", "", "figure"),
+    columns = columns_of(
+        "Run | Began | >Bias [deg/h] | >Slope, temperature [deg/h/°C] | "
+        ">Slope, rate [deg/h/(°C/min)] | >Scatter [deg/h] | >Scale factor error [ppm] | "
+        ">Outside training"
     )
-    return Table(columns, tuple(rows), "What the model leaves on each run, in the order of time.")
+    return Table(columns, rows, "What the model leaves on each run, in the order of time.")

@@ -7,7 +7,7 @@ from typing import Any
 
 from fogml.report.figures_noise import TERM_WORDS, allan_plot
 from fogml.report.page import Tile, render
-from fogml.report.tables import Row, Table, noticed
+from fogml.report.tables import Table, columns_of, noticed
 from fogml.report.words import MISSING, duration, number
 
 _UNITS = {
@@ -102,30 +102,20 @@ def _terms(noise: Mapping[str, Any]) -> Table:
             told = str(term.get("reason") or bound)
         else:
             told = "seen" if interval[0] else "not told from zero"
-        rows.append(Row((f"{key}, {words}", number(value), _interval(term), _unit(term), told)))
+        rows.append((f"{key}, {words}", number(value), _interval(term), _unit(term), told))
     level = 100 * float(noise.get("level", 0.9))
     return Table(
-        columns=(
-            ("Term", "", "text"),
-            ("Value", "", "figure"),
-            (f"{level:.0f} % interval", "", "figure"),
-            ("Unit", "", "text"),
-            ("In the data", "", "text"),
-        ),
-        rows=tuple(rows),
+        columns=columns_of(f"Term | >Value | >{level:.0f} % interval | Unit | In the data"),
+        rows=rows,
     )
 
 
 def _deviations(noise: Mapping[str, Any]) -> Table:
     intervals = noise.get("ci") or [[None, None]] * len(noise["taus_s"])
     return Table(
-        columns=(
-            ("τ", "s", "figure"),
-            ("Allan deviation", "deg/h", "figure"),
-            ("Interval", "deg/h", "figure"),
-        ),
-        rows=tuple(
-            Row((number(tau, 4), number(value), f"{number(low)} … {number(high)}"))
+        columns=columns_of(">τ [s] | >Allan deviation [deg/h] | >Interval [deg/h]"),
+        rows=(
+            (number(tau, 4), number(value), f"{number(low)} … {number(high)}")
             for tau, value, (low, high) in zip(noise["taus_s"], noise["adev"], intervals, strict=True)
         ),
     )
@@ -170,8 +160,8 @@ def _replicates(noise: Mapping[str, Any]) -> Table | None:
         return None
     terms = [(str(one["run"]), one["terms"]["N"]) for one in runs]
     return Table(
-        columns=(("Run", "", "text"), ("N alone", _unit(terms[0][1]), "figure"), ("Interval", "", "figure")),
-        rows=tuple(Row((name, number(term["value"]), _interval(term))) for name, term in terms),
+        columns=columns_of(f"Run | >N alone [{_unit(terms[0][1])}] | >Interval"),
+        rows=((name, number(term["value"]), _interval(term)) for name, term in terms),
     )
 
 

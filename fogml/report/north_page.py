@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.tables import Row, Table, noticed
+from fogml.report.tables import Row, Table, columns_of, noticed
 from fogml.report.words import MISSING, duration, listed, number, stated
 
 
@@ -106,16 +106,11 @@ def _ways(values: Mapping[str, Any]) -> Table:
         for name, told in values["ways"].items()
     ]
     return Table(
-        columns=(
-            ("Way", "", "text"),
-            ("Stays", "", "figure"),
-            ("Dwell", "s", "figure"),
-            ("Error here", "deg", "figure"),
-            ("Greatest error", "deg", "figure"),
-            ("Rms over the circle", "deg", "figure"),
-            ("Standard error of noise, rms", "deg", "figure"),
+        columns=columns_of(
+            "Way | >Stays | >Dwell [s] | >Error here [deg] | >Greatest error [deg] | "
+            ">Rms over the circle [deg] | >Standard error of noise, rms [deg]"
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption=f"Every way takes {duration(values['duration_s'])} with transfers. Dwell: of the fine one.",
     )
 
@@ -134,24 +129,21 @@ def _quiet(values: Mapping[str, Any]) -> Table:
         for told in values["quiet_by_set_up"]
     ]
     return Table(
-        columns=(
-            ("Positions taken", "", "text"),
-            ("Order", "deg", "text"),
-            ("Quiet for a linear drift", "deg", "figure"),
-            ("Quiet for this drift", "deg", "figure"),
+        columns=columns_of(
+            "Positions taken | Order [deg] | >Quiet for a linear drift [deg] | >Quiet for this drift [deg]"
         ),
-        rows=tuple(rows),
+        rows=rows,
     )
 
 
 def _stays(values: Mapping[str, Any]) -> Table:
     rows = [
-        Row((str(stay["position"]), number(stay["time_s"], 5), number(stay["mean_deg_h"], 6)))
+        (str(stay["position"]), number(stay["time_s"], 5), number(stay["mean_deg_h"], 6))
         for stay in values["stays"]
     ]
     return Table(
-        columns=(("Position", "", "text"), ("Middle", "s", "figure"), ("Mean", "deg/h", "figure")),
-        rows=tuple(rows),
+        columns=columns_of("Position | >Middle [s] | >Mean [deg/h]"),
+        rows=rows,
     )
 
 

@@ -9,7 +9,7 @@ from fogml.gap.result_parts import Rehearsed
 from fogml.report.figures_plan import errors_drawing, programme_drawing
 from fogml.report.gap_tables_ahead import rehearsal_table
 from fogml.report.page import Tile, render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Row, Table, columns_of
 from fogml.report.words import MISSING, listed, number, plural, stated
 from fogml.twin.registry import effects
 
@@ -78,28 +78,21 @@ def _wanted(values: Mapping[str, Any]) -> Table | None:
     if not values["wanted"]:
         return None
     rows = [
-        Row(
-            (
-                e["name"],
-                e["unit"],
-                number(e["usual"]),
-                number(e["prior_se"]),
-                number(e["se"]),
-                "yes" if e["shown"] else "no",
-            )
+        (
+            e["name"],
+            e["unit"],
+            number(e["usual"]),
+            number(e["prior_se"]),
+            number(e["se"]),
+            "yes" if e["shown"] else "no",
         )
         for e in values["wanted"]
     ]
     return Table(
-        columns=(
-            ("Wanted", "", "text"),
-            ("Unit", "", "text"),
-            ("Taken as", "", "figure"),
-            ("Standard error before", "", "figure"),
-            ("Expected standard error", "", "figure"),
-            ("Shown", "", "text"),
+        columns=columns_of(
+            "Wanted | Unit | >Taken as | >Standard error before | >Expected standard error | Shown"
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption="Fitted with the nominal constants under their priors. Shown: a tenth better than before; "
         "of an amplitude, that its usual size is three standard errors.",
     )
@@ -109,35 +102,26 @@ def _correlations(values: Mapping[str, Any]) -> Table | None:
     names = [e["name"] for e in values["wanted"]]
     if not 1 < len(names) <= 8:
         return None
-    rows = [Row((name, *(number(c, 2) for c in row))) for name, row in zip(names, values["correlations"])]
-    return Table(
-        columns=(("Correlation", "", "text"), *((name, "", "figure") for name in names)), rows=tuple(rows)
-    )
+    rows = [(name, *(number(c, 2) for c in row)) for name, row in zip(names, values["correlations"])]
+    return Table(columns=(*columns_of("Correlation"), *((name, "", "figure") for name in names)), rows=rows)
 
 
 def _separations(values: Mapping[str, Any]) -> Table | None:
     rows = [
-        Row(
-            (pair["true"], pair["taken_for"], number(pair["distance"]), number(item["lengths"][pair["true"]]))
-        )
+        (pair["true"], pair["taken_for"], number(pair["distance"]), number(item["lengths"][pair["true"]]))
         for item in values["separations"]
         for pair in item["pairs"]
     ]
     rows += [
-        Row((item["separates"][0], MISSING, MISSING, number(item["distance"])))
+        (item["separates"][0], MISSING, MISSING, number(item["distance"]))
         for item in values["separations"]
         if not item["pairs"]
     ]
     if not rows:
         return None
     return Table(
-        columns=(
-            ("If it is", "", "text"),
-            ("and is taken for", "", "text"),
-            ("Distance", "", "figure"),
-            ("Length beside the constants", "", "figure"),
-        ),
-        rows=tuple(rows),
+        columns=columns_of("If it is | and is taken for | >Distance | >Length beside the constants"),
+        rows=rows,
         caption=(
             "In standard deviations of the noise: what the best fit of the other leaves, amplitude and shape "
             "free, and what the constants leave."
@@ -158,8 +142,7 @@ def _alternatives(run: Mapping[str, Any]) -> Table | None:
 
     return Table(
         columns=(
-            ("Programme", "", "text"),
-            ("Hours", "", "figure"),
+            *columns_of("Programme | >Hours"),
             *((f"se of {name}", "", "figure") for name in wanted),
             *((f"distance of {group}", "", "figure") for group in groups),
         ),

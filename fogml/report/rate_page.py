@@ -11,7 +11,7 @@ from markupsafe import Markup
 from fogml.lab.rate_words import result_rows
 from fogml.report import style
 from fogml.report.page import Tile, render
-from fogml.report.tables import Row, Table
+from fogml.report.tables import Table, columns_of
 from fogml.report.words import number, stated
 from fogml.static_svg import Curve, line_figure
 
@@ -61,15 +61,9 @@ def _bracket_tile(name: str, found: Mapping[str, float | None]) -> Tile:
 
 
 def _result(values: Mapping[str, Any]) -> Table:
-    rows = tuple(Row(tuple(row)) for row in result_rows(values, number))
+    rows = tuple(tuple(row) for row in result_rows(values, number))
     return Table(
-        (
-            ("Quantity", "", "text"),
-            ("Value", "", "figure"),
-            ("Standard error", "", "figure"),
-            ("Unit", "", "text"),
-            ("Remark", "", "text"),
-        ),
+        columns_of("Quantity | >Value | >Standard error | Unit | Remark"),
         rows,
     )
 
@@ -185,11 +179,11 @@ def _unit(facts: Mapping[str, Any] | None) -> Table | None:
     """What follows from the unit's coil and receiver."""
     if facts is None:
         return None
-    rows = [Row((name, number(facts[key], 4), unit)) for key, name, unit in _UNIT]
+    rows = [(name, number(facts[key], 4), unit) for key, name, unit in _UNIT]
     caption = (
         f"{stated(facts['length_m'])} m of fibre on {stated(facts['diameter_m'])} m, "
         f"{stated(facts['wavelength_nm'])} nm, {facts['winding']} winding of {facts['layers']} layers, "
         f"leads of {' and '.join(stated(length) for length in facts['leads_m'])} m."
     )
-    columns = (("Quantity", "", "text"), ("Value", "", "figure"), ("Unit", "", "text"))
-    return Table(columns, tuple(rows), caption)
+    columns = columns_of("Quantity | >Value | Unit")
+    return Table(columns, rows, caption)

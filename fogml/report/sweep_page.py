@@ -8,7 +8,7 @@ from typing import Any
 from fogml.report import figures_judgement
 from fogml.report.figures_sweep import history, importance_bars, pareto_front
 from fogml.report.page import Tile, render
-from fogml.report.tables import Row, Table, metrics_table
+from fogml.report.tables import Row, Table, columns_of, metrics_table
 from fogml.report.verdict import worst_run
 from fogml.report.words import MISSING, averages, number, plural
 from fogml.tuning.references import DEFAULT
@@ -142,14 +142,11 @@ def _pareto_table(study: Mapping[str, Any]) -> Table:
             str(trial["operations"]),
         )
         rows.append(Row(cells, "chosen" if trial["number"] == study["winner"]["number"] else ""))
-    columns = (
-        ("Model", "", "text"),
-        ("Held-out rms", "deg/h", "figure"),
-        ("About each run's mean", "deg/h", "figure"),
-        ("Weights", "byte", "figure"),
-        ("Operations", "per sample", "figure"),
+    columns = columns_of(
+        "Model | >Held-out rms [deg/h] | >About each run's mean [deg/h] | >Weights [byte] | "
+        ">Operations [per sample]"
     )
-    return Table(columns, tuple(rows), "The Pareto set, the least error first.")
+    return Table(columns, rows, "The Pareto set, the least error first.")
 
 
 def _refused(study: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -39,25 +39,52 @@ class Row:
     keys: tuple[str | float | None, ...] = ()
 
 
-@dataclass(frozen=True)
 class Table:
-    """A table as a page shows it; every column has a heading, which sorts if it is `sortable`.
+    """A table as a page shows it.
+
+    Attributes
+    ----------
+    columns
+        Every one has a heading.
+    rows
+        What is given as cells alone is a row as well.
+    caption
+        Above the table.
+    sortable
+        Whether a click on a heading sorts.
 
     Raises
     ------
     ValueError
-        If one has none.
+        If a column has no heading.
     """
 
-    columns: tuple[Column, ...]
-    rows: tuple[Row, ...]
-    caption: str = ""
-    sortable: bool = False
-
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        columns: Iterable[Column],
+        rows: Iterable[Row | tuple[str, ...]],
+        caption: str = "",
+        sortable: bool = False,
+    ) -> None:
+        self.columns, self.caption, self.sortable = tuple(columns), caption, sortable
+        self.rows = tuple(row if isinstance(row, Row) else Row(row) for row in rows)
         for place, (heading, _, _) in enumerate(self.columns, 1):
             if not heading.strip():
-                raise ValueError(f"column {place} of the table '{self.caption}' has no heading")
+                raise ValueError(f"column {place} of the table '{caption}' has no heading")
+
+
+def columns_of(headings: str) -> tuple[Column, ...]:
+    """Columns from headings such as ``Run | >Bias [deg/h] | >>Rms [deg/h] | Remark``.
+
+    Figures are set off by >, pairs of them that may stand below each other by >>.
+    """
+    kinds = ("text", "figure", "figure pair")
+    columns = []
+    for one in headings.split(" | "):
+        heading = one.lstrip(">")
+        name, _, unit = heading.removesuffix("]").partition(" [")
+        columns.append((name, unit, kinds[len(one) - len(heading)]))
+    return tuple(columns)
 
 
 @dataclass(frozen=True)
@@ -83,16 +110,10 @@ def metrics_table(judged: RunJudgement) -> Table:
             continue
         floor = number(judged.floor) if field.name in ("bias_stability", "rms") else ""
         cells = (label(field.name), number(before), number(after), floor, unit_of(field.name))
-        rows.append(Row(cells))
+        rows.append(cells)
     return Table(
-        columns=(
-            ("Figure", "", "text"),
-            ("Before", "", "figure"),
-            ("After", "", "figure"),
-            ("Floor", "", "figure"),
-            ("Unit", "", "text"),
-        ),
-        rows=tuple(rows),
+        columns=columns_of("Figure | >Before | >After | >Floor | Unit"),
+        rows=rows,
         caption=(
             f"{averages(judged.averaging_s)} where not said otherwise; "
             f"bias relative to {reference_of(judged)}."
@@ -106,32 +127,24 @@ def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
     ``caption`` follows the averaging time in the table's caption.
     """
     rows = [
-        Row(
-            (
-                run.run,
-                *(
-                    f"{number(getattr(run.before, name))} → {number(getattr(run.after, name))}"
-                    for name in ("bias", "bias_stability", "range", "rms")
-                ),
-                number(run.floor),
-                percent(run.outside_training),
-                f"{run.rows_used:,}".replace(",", "\u202f"),
-            )
+        (
+            run.run,
+            *(
+                f"{number(getattr(run.before, name))} → {number(getattr(run.after, name))}"
+                for name in ("bias", "bias_stability", "range", "rms")
+            ),
+            number(run.floor),
+            percent(run.outside_training),
+            f"{run.rows_used:,}".replace(",", "\u202f"),
         )
         for run in runs
     ]
     return Table(
-        columns=(
-            ("Run", "", "text"),
-            ("Bias", "deg/h", "figure"),
-            ("Bias stability", "deg/h", "figure"),
-            ("Range", "deg/h", "figure"),
-            ("Rms", "deg/h", "figure"),
-            ("Noise floor", "deg/h", "figure"),
-            ("Outside training", "", "figure"),
-            ("Samples used", "", "figure"),
+        columns=columns_of(
+            "Run | >Bias [deg/h] | >Bias stability [deg/h] | >Range [deg/h] | >Rms [deg/h] | "
+            ">Noise floor [deg/h] | >Outside training | >Samples used"
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption=f"{averages(runs[0].averaging_s).capitalize()}, before → after{caption}.",
     )
 
@@ -141,20 +154,18 @@ def beside_table(judgement: Judgement) -> Table | None:
     if not judgement.beside:
         return None
     rows = [
-        Row(
-            (
-                run.run,
-                *(number(v) for v in (run.before.rms, run.after.rms)),
-                *(number(others[i].after.rms) for others in judgement.beside.values()),
-                number(run.floor),
-            )
+        (
+            run.run,
+            *(number(v) for v in (run.before.rms, run.after.rms)),
+            *(number(others[i].after.rms) for others in judgement.beside.values()),
+            number(run.floor),
         )
         for i, run in enumerate(judgement.test)
     ]
     figures = ["before", judgement.model["kind"], *judgement.beside, "noise floor"]
     return Table(
-        columns=(("Run", "", "text"), *((name.capitalize(), "deg/h", "figure") for name in figures)),
-        rows=tuple(rows),
+        columns=(*columns_of("Run"), *((name.capitalize(), "deg/h", "figure") for name in figures)),
+        rows=rows,
         caption=f"Rms of {averages(judgement.test[0].averaging_s)}, on the same rows.",
     )
 
@@ -166,22 +177,14 @@ def repeatability_table(found: Repeatability | None) -> Table | None:
     told = {"bias_repeatability": found.bias, "scale_factor_repeatability": found.scale_factor}
     cycles = "power cycles" if found.power_cycles else "runs, each taken as one power cycle"
     return Table(
-        columns=(
-            ("Figure", "", "text"),
-            ("Before", "", "figure"),
-            ("After", "", "figure"),
-            ("Unit", "", "text"),
-            ("After, 90 %", "", "text"),
-        ),
-        rows=tuple(
-            Row(
-                (
-                    label(name),
-                    number(figure.before),
-                    number(figure.after),
-                    unit_of(name),
-                    " to ".join(map(number, figure.after_ci90)),
-                )
+        columns=columns_of("Figure | >Before | >After | Unit | After, 90 %"),
+        rows=(
+            (
+                label(name),
+                number(figure.before),
+                number(figure.after),
+                unit_of(name),
+                " to ".join(map(number, figure.after_ci90)),
             )
             for name, figure in told.items()
             if figure is not None
@@ -213,12 +216,8 @@ def coefficients_table(model: Mapping[str, Any]) -> Table | None:
     if not told:
         return None
     return Table(
-        columns=(
-            ("Term", "", "text"),
-            ("Coefficient", "deg/h per unit of the term", "figure"),
-            ("Standard error", "", "figure"),
-        ),
-        rows=tuple(Row((name, number(value, 5), number(error, 2))) for name, value, error in told),
+        columns=columns_of("Term | >Coefficient [deg/h per unit of the term] | >Standard error"),
+        rows=((name, number(value, 5), number(error, 2)) for name, value, error in told),
         caption=_OF_THE_OUTPUT if any(name == "D" for name, *_ in told) else "",
     )
 
@@ -229,13 +228,9 @@ def candidates_table(model: Mapping[str, Any]) -> Table | None:
     if not candidates:
         return None
     return Table(
-        columns=(
-            ("Candidate", "", "text"),
-            ("Parameters", "", "figure"),
-            ("Rms held out", "deg/h", "figure"),
-        ),
-        rows=tuple(
-            Row((str(told["name"]), str(told["parameters"]), number(float(told["held_out_rms"]))))
+        columns=columns_of("Candidate | >Parameters | >Rms held out [deg/h]"),
+        rows=(
+            (str(told["name"]), str(told["parameters"]), number(float(told["held_out_rms"])))
             for told in candidates
         ),
         caption="On parts left out of training in turn; a larger one is taken only if better beyond noise.",

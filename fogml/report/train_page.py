@@ -14,11 +14,11 @@ from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import (
     Noticed,
-    Row,
     Table,
     beside_table,
     candidates_table,
     coefficients_table,
+    columns_of,
     metrics_table,
     noticed,
     repeatability_table,
@@ -241,15 +241,14 @@ def _table(run: Mapping[str, Any], costs: Mapping[str, Any]) -> Table:
                     run["constant"]["before"][axis][kind], run["constant"]["after"][axis][kind], strict=True
                 )
             ]
-            rows.append(Row((f"{axis} gyro, {kind.partition('_')[0]}", unit, *cells)))
+            rows.append((f"{axis} gyro, {kind.partition('_')[0]}", unit, *cells))
     before, after = (run["constant"][when] for when in ("before", "after"))
     return Table(
         columns=(
-            ("Constant drift of", "", "text"),
-            ("Unit", "", "text"),
+            *columns_of("Constant drift of | Unit"),
             *((f"{hours:g} h", "", "figure pair") for hours in costs["hours"]),
         ),
-        rows=tuple(rows),
+        rows=rows,
         caption=(
             f"Largest error until then, before → after, for a constant drift of the rms: "
             f"{number(before['drift_deg_h'])} → {number(after['drift_deg_h'])} deg/h. A gyrocompass "
