@@ -135,7 +135,7 @@ def _check_device(settings: FleetSettings) -> None:
     import torch
 
     if settings.model != "rbf":
-        raise InputError(f"--device trains RBF networks in batches; '{settings.model}' is none: --model rbf")
+        raise InputError(f"--device is for RBF networks; '{settings.model}' is none: --model rbf")
     try:
         torch.zeros(1, device=settings.device)
     except (RuntimeError, AssertionError) as error:
@@ -156,10 +156,6 @@ def _run(
         if outcome["status"] != DONE:
             terminal.note(f"{label}: {outcome['reason']}")
 
-    if settings.device is not None:
-        from fogml.fleet.engines import run_batched
-
-        return run_batched(tasks, settings.batch, told)
     return run_tasks(tasks, workers=settings.workers, cluster=settings.cluster, progress=told)
 
 

@@ -48,12 +48,11 @@ class FleetSettings(options.LimitSettings):
     device: Annotated[
         str | None,
         option(
-            "Train the units' RBF networks in batches there: cpu, cuda.",
+            "Train the units' RBF networks there: cpu, cuda.",
             metavar="DEVICE",
             known=("cpu", "cuda"),
         ),
     ] = None
-    batch: Annotated[int, option("Units in one batch.")] = 64
     track: options.Track = None
     repair: options.Repair = False
     strict: options.Strict = False
@@ -67,7 +66,7 @@ class FleetSettings(options.LimitSettings):
 
     def for_units(self) -> dict[str, Any]:
         """What units' results depend on."""
-        left_out = {"manifest", "prior", "workers", "cluster", "device", "batch", "track", "out"}
+        left_out = {"manifest", "prior", "workers", "cluster", "device", "track", "out"}
         values = self.model_dump(mode="json", exclude=left_out)
         if self.device is not None:
             values["parameters"] = {**self.parameters, "device": self.device}

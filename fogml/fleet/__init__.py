@@ -1,1 +1,1 @@
-"""Many units: manifests, engines that run a job for each, shared priors, batched training."""
+"""Many units: manifests, engines that run a job for each, shared priors."""

@@ -131,7 +131,7 @@ def test_a_fleet_and_the_next_unit_drawn_to_it(invoke, invoke_json, tmp_path):
     assert drawn["units"][0]["model"] == "shared"
 
 
-def test_networks_in_batches_are_those_of_train(invoke_json, tmp_path):
+def test_networks_of_a_fleet_are_those_of_train(invoke_json, tmp_path):
     manifest = write_fleet(tmp_path, 2)
     model = ("--model", "rbf", "--features", "T, dT", "--set", "centres=4", "--set", "average_rows=200")
     shared = ("--averaging", 40)

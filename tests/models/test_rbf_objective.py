@@ -94,8 +94,8 @@ def test_leaving_out_centres_costs_what_the_evidence_says() -> None:
 
     kept = objective.fewest_centres(shape, 0.0)
     assert 0 in kept and 5 not in kept
-    best = objective.value(without(kept)).value
-    assert best <= objective.value(shape).value
+    best = objective(without(kept)).value
+    assert best <= objective(shape).value
     for j in kept:
-        assert objective.value(without(np.setdiff1d(kept, [j]))).value > best
+        assert objective(without(np.setdiff1d(kept, [j]))).value > best
     assert len(objective.fewest_centres(shape, 1e9)) == 0

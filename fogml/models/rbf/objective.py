@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
-from fogml.models.rbf.together import joined
 
 if TYPE_CHECKING:
     import torch
@@ -140,24 +139,8 @@ class Objective:
         design[:, :count] = torch.mm(self._moments, self._tensor(exponent.T)).clamp_(self._floor, 0.0).exp_()
         return design
 
-    @property
-    def form(self) -> tuple[object, ...]:
-        """What objectives have to share to be worked out as one batch."""
-        place = self._linear.device, self._linear.dtype
-        return self.rows, self.dimensions, self._linear_columns, self._evidence, *place
-
-    @property
-    def device_type(self) -> str:
-        """Where it is worked out: ``cpu``, ``cuda``."""
-        return str(self._linear.device.type)
-
     def __call__(self, shape: Shape) -> Value:
         """Objective and gradient at a shape; infinite where the normal equations break down."""
-        together = joined()
-        return self.value(shape) if together is None else together.value(self, shape)
-
-    def value(self, shape: Shape) -> Value:
-        """As called, worked out alone."""
         torch = self._torch
         count = len(shape.centres)
         ridge = float(np.exp(shape.log_ridge))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,6 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.models.rbf.blocks import AveragedRows, Frame, Level, Watch, held_out_rows
 from fogml.models.rbf.centres import kmeans_centres, ols_centres
 from fogml.models.rbf.objective import Shape
-from fogml.models.rbf.together import joined
 from fogml.models.rbf.tuning import (
     LOG_WIDTH_RANGE,
     Descent,
@@ -150,7 +149,7 @@ class Search:
         if dimensions == 0 or not sizes or self._linear_suffices():
             return Found(Shape(np.empty((0, dimensions)), np.empty((0, dimensions)), 0.0), {0: 0.0}, 1.0)
         evidence = self.settings.evidence
-        with one_thread("blas"), _one_torch_thread(), self._beside_others():
+        with one_thread("blas"), _one_torch_thread():
             first = self._first(min(sizes[0], _TRIED_CENTRES))
             starts = [tried.log_widths for tried in first]
             # With fewer independent rows another optimum is the better one, and not near the first.
@@ -174,12 +173,6 @@ class Search:
             return shape
         kept = self._fine.objective(True, self._share)[0].fewest_centres(shape, self.settings.worth)
         return Shape(shape.centres[kept], shape.log_widths[kept], shape.log_ridge)
-
-    @staticmethod
-    def _beside_others() -> AbstractContextManager[None]:
-        """Meet the descents of other fits, where there are some."""
-        together = joined()
-        return nullcontext() if together is None else together.descending()
 
     def _linear_suffices(self) -> bool:
         """Whether the linear part leaves nothing but rounding."""
