@@ -95,4 +95,5 @@ def test_a_refused_command_says_why(tmp_path: Path) -> None:
     name = jobs.add(lambda results: ["inspect", "files/none.csv", "--out", results])
     until("refused", jobs, name)
     told = jobs.in_full(name)
-    assert "none.csv" in told["stderr"] and told["files"] == []
+    # What it said last is no progress once it has ended.
+    assert "none.csv" in told["stderr"] and told["files"] == [] and told["progress"] == ""

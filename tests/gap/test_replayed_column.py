@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,26 @@ def test_the_gap_is_recorded_less_the_column():
         # What the simulator knows is no part of the gap: smooth rows leave what it misses.
         rows = rows_of(made, told.model.twin, 400)
         assert abs(rows.gap.mean() - 0.2) < 0.15 and np.std(rows.gap) < 0.25
+
+
+def test_averages_of_a_replay_are_moved_by_what_the_column_is_apart():
+    @dataclass(frozen=True)
+    class Averages:
+        run: str
+        averaging_s: float
+        time_s: np.ndarray
+        recorded: np.ndarray
+        replayed: np.ndarray
+
+    runs = [run(1), run(2)]
+    told = by_column(load_twin("nominal"), runs[:1], runs[1:])
+    centres = np.array([300.0, 900.0, 3300.0, 5000.0])
+    shown = told._moved(Averages("r1", 600.0, centres, centres * 0.0, centres * 0.0), ("replayed",))
+    apart = runs[0].columns["replayed"] - replay(told.model.twin, runs[0])
+    time = runs[0].time
+    within = [(time >= centre - 300.0) & (time < centre + 300.0) for centre in centres]
+    np.testing.assert_allclose(shown.replayed, [apart[rows].mean() for rows in within], atol=1e-12)
+    assert not shown.recorded.any()
 
 
 def test_runs_that_have_it_and_runs_that_do_not_are_refused():

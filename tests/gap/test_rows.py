@@ -44,6 +44,16 @@ def test_spikes_and_a_limit_of_the_output_are_masked():
     assert not whole.masked
 
 
+@pytest.mark.parametrize(("values", "masked"), [(50, {}), (51, {"saturated": 20})])
+def test_an_output_of_few_values_has_no_limit(values, masked):
+    """Of 50 values or fewer each comes again and again, the greatest too."""
+    time = 5.0 * np.arange(2000)
+    gyro = 0.01 * np.random.default_rng(3).permutation(np.arange(2000) % (values - 1))
+    gyro[700:720] = 0.01 * (values - 1)
+    run = Run.from_columns("counts", time=time, gyro=gyro, T=25.0 + 0.001 * time)
+    assert rows_of(run, load_twin("nominal"), 600).masked == masked
+
+
 def test_a_constant_far_off_is_said_and_fitted_all_the_same():
     scene = _scene(_cycle(offset=-40.0))
     twin = load_twin("nominal")

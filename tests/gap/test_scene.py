@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fogml.gap.scene import Scene
+from fogml.gap.grids import Grids
+from fogml.gap.scene import Scene, outstanding_lines
 
 
 def rows(first_s: float, span_s: float, row_s: float, started: datetime | None) -> SimpleNamespace:
@@ -32,3 +33,13 @@ def test_runs_of_known_start_lie_as_stated() -> None:
     day = datetime(2026, 3, 1, tzinfo=UTC)
     runs = [rows(0.0, 990.0, 10.0, day + timedelta(hours=h)) for h in (5.0, 0.0, 30.0)]
     assert begun(*runs) == pytest.approx((18_000.0, 0.0, 108_000.0))
+
+
+def test_a_line_of_a_quiet_run_stands_out_beside_a_loud_run() -> None:
+    """Each run's power counts by its own."""
+    rng, time = np.random.default_rng(4), 60.0 * np.arange(600)
+    line = 0.3 * np.sin(2.0 * np.pi * 2e-3 * time)
+    gaps = [30.0 * rng.standard_normal(600), 0.1 * rng.standard_normal(600) + line]
+    fit = tuple(SimpleNamespace(time_s=time, constants=np.ones((600, 1)), gap=gap) for gap in gaps)
+    scene: Any = SimpleNamespace(grids=Grids(), fit=fit, span_s=36_000.0, row_s=60.0)
+    assert outstanding_lines(scene)[0] == pytest.approx(2e-3, abs=1.0 / 36_000.0)

@@ -1,7 +1,11 @@
 """Columns of families against loops written by hand, and against the effects themselves."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
+from fogml.gap.grids import Grids
+from fogml.gap.thermal_families import transition
 from fogml.signals.bases import bumps, preisach, relays
 from fogml.signals.recursions import play_kernel
 from fogml.signals.smoothing import smoothed, window_difference
@@ -57,3 +61,16 @@ def test_window_differences_are_integrals():
     time = np.array([0.0, 10.0, 30.0, 40.0, 90.0, 100.0, 200.0, 300.0])
     np.testing.assert_allclose(window_difference(time, 0.5 * time, 40.0)[5:], 0.5 * 40.0)
     np.testing.assert_allclose(window_difference(time, np.full(8, 7.0), 40.0), 0.0, atol=1e-12)
+
+
+def test_the_peak_of_a_transition_is_its_steps_rate():
+    """d tanh(u) / dt by finite differences, per minute and width."""
+    time = 2.0 * np.arange(3000)
+    temperature = 25.0 + 20.0 * np.sin(time / 900.0)
+    rows = SimpleNamespace(of=lambda values: values, even=SimpleNamespace(time=time))
+    place = SimpleNamespace(temperature=temperature, name="coil")
+    scene = SimpleNamespace(grids=Grids(), range_degc=(5.0, 45.0), coil=lambda rows: [place])
+    for block in transition(rows, scene, None):
+        step, peak = block.columns[:, 0], block.columns[:, 1]
+        expected = 60.0 * np.gradient(step, time) * block.shape["width"]
+        np.testing.assert_allclose(peak[1:-1], expected[1:-1], atol=2e-3 * np.abs(peak).max())

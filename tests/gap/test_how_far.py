@@ -1,0 +1,40 @@
+"""When a held-out run's white noise is its own."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import fogml.gap.how_far as how_far
+from fogml.gap.noise import white_noise
+from fogml.gap.settings import Priors
+from fogml.signals.noise_model import NoiseModel
+
+ROWS, STATED = 60, 1.4
+
+
+def _rows(seed):
+    gap = np.random.default_rng(seed).standard_normal(ROWS)
+    return SimpleNamespace(gap=gap, constants=np.ones((ROWS, 1)), row_s=3600.0)
+
+
+def test_white_noise_of_a_run_is_known_as_well_as_stated():
+    logs = np.log([white_noise(_rows(seed), 0.0) for seed in range(1500)])
+    # Its deviation is known to 2 % of 1500 runs.
+    assert np.std(logs) == pytest.approx(STATED / math.sqrt(ROWS), rel=0.12)
+
+
+@pytest.mark.parametrize(("errors", "own"), [(2.9, False), (3.1, True), (-2.9, False), (-3.1, True)])
+def test_beyond_three_of_its_errors_the_noise_is_the_runs_own(monkeypatch, errors, own):
+    usual = NoiseModel(0.01, 0.001, 0.0)
+    found = SimpleNamespace(
+        field=SimpleNamespace(whitening=SimpleNamespace(noise=usual)),
+        setting=SimpleNamespace(priors=Priors()),
+        points=SimpleNamespace(prior=SimpleNamespace(centre=usual)),
+    )
+    white = usual.N * math.exp(errors * STATED / math.sqrt(ROWS))
+    monkeypatch.setattr(how_far, "white_noise", lambda *_: white)
+    model, said = how_far._own_noise(range(ROWS), found, ())
+    assert (white if own else usual.N) == model.N and model.B == usual.B
+    assert bool(said) == own
