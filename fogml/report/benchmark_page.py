@@ -172,22 +172,20 @@ def _ratios(values: Mapping[str, Any]) -> Drawing:
         shown += x
         look = place % len(style.SERIES)
         marker = {"symbol": style.MARKERS[look], "size": 9, "color": style.SERIES[look]}
-        figure.add_trace(go.Scatter(x=x, y=names, mode="markers", name=group, marker=marker))
-    figure.add_trace(
-        go.Scatter(
-            x=[told[name]["value"] for name in names],
-            y=names,
-            mode="markers",
-            name="all, with 95 % interval",
-            marker={"symbol": "line-ns-open", "size": 16, "color": style.BLACK, "line": {"width": 3}},
-            error_x={
-                "type": "data",
-                "symmetric": False,
-                "array": [(t["high"] or t["value"]) - t["value"] for t in told.values()],
-                "arrayminus": [t["value"] - (t["low"] or t["value"]) for t in told.values()],
-                "color": style.BLACK,
-            },
-        )
+        figure.add_scatter(x=x, y=names, mode="markers", name=group, marker=marker)
+    figure.add_scatter(
+        x=[told[name]["value"] for name in names],
+        y=names,
+        mode="markers",
+        name="all, with 95 % interval",
+        marker={"symbol": "line-ns-open", "size": 16, "color": style.BLACK, "line": {"width": 3}},
+        error_x={
+            "type": "data",
+            "symmetric": False,
+            "array": [(t["high"] or t["value"]) - t["value"] for t in told.values()],
+            "arrayminus": [t["value"] - (t["low"] or t["value"]) for t in told.values()],
+            "color": style.BLACK,
+        },
     )
     figure.add_vline(x=1.0, line=style.FLOOR_LINE)
     ends = [v for t in told.values() for v in (t["low"], t["high"]) if v]

@@ -169,23 +169,21 @@ _CHANCE = {"color": style.GREY, "width": 1.2, "dash": "dash"}
 def reliability_plot(bins: Sequence[Mapping[str, Any]], error: float | None) -> Drawing:
     """Stated probability against frequency, with Wilson intervals and the diagonal."""
     figure = go.Figure()
-    figure.add_trace(go.Scatter(x=[0, 1], y=[0, 1], mode="lines", name="as stated", line=_CHANCE))
+    figure.add_scatter(x=[0, 1], y=[0, 1], mode="lines", name="as stated", line=_CHANCE)
     found = [part["found"] for part in bins]
-    figure.add_trace(
-        go.Scatter(
-            x=[part["stated"] for part in bins],
-            y=found,
-            error_y={
-                "array": [part["high"] - part["found"] for part in bins],
-                "arrayminus": [part["found"] - part["low"] for part in bins],
-            },
-            mode="markers+text",
-            text=[str(part["n"]) for part in bins],
-            textposition="bottom right",
-            textfont={"size": 11},
-            marker={"size": 9, "color": style.BLUE},
-            name="found, 95 % interval; the number is how many",
-        )
+    figure.add_scatter(
+        x=[part["stated"] for part in bins],
+        y=found,
+        error_y={
+            "array": [part["high"] - part["found"] for part in bins],
+            "arrayminus": [part["found"] - part["low"] for part in bins],
+        },
+        mode="markers+text",
+        text=[str(part["n"]) for part in bins],
+        textposition="bottom right",
+        textfont={"size": 11},
+        marker={"size": 9, "color": style.BLUE},
+        name="found, 95 % interval; the number is how many",
     )
     figure.update_xaxes(title_text="stated probability", range=[-0.02, 1.08])
     figure.update_yaxes(title_text="share that is true", range=[-0.1, 1.04])
@@ -201,21 +199,19 @@ def reliability_plot(bins: Sequence[Mapping[str, Any]], error: float | None) -> 
 def open_set_plot(curves: Mapping[str, Mapping[str, Sequence[float]]], areas: Mapping[str, Any]) -> Drawing:
     """True against false positives on the unknown's probability, a line per method."""
     figure = go.Figure()
-    figure.add_trace(go.Scatter(x=[0, 1], y=[0, 1], mode="lines", name="chance", line=_CHANCE))
+    figure.add_scatter(x=[0, 1], y=[0, 1], mode="lines", name="chance", line=_CHANCE)
     shown = [(name, curve) for name, curve in curves.items() if len(curve["false_positive"]) > 2]
     for place, (name, curve) in enumerate(shown):
-        figure.add_trace(
-            go.Scatter(
-                x=list(curve["false_positive"]),
-                y=list(curve["true_positive"]),
-                mode="lines",
-                name=f"{name} ({number(areas.get(name))})",
-                line={
-                    "color": style.SERIES[place % len(style.SERIES)],
-                    "dash": style.DASHES[place % len(style.DASHES)],
-                    "width": 2.4 if place == 0 else 1.4,
-                },
-            )
+        figure.add_scatter(
+            x=list(curve["false_positive"]),
+            y=list(curve["true_positive"]),
+            mode="lines",
+            name=f"{name} ({number(areas.get(name))})",
+            line={
+                "color": style.SERIES[place % len(style.SERIES)],
+                "dash": style.DASHES[place % len(style.DASHES)],
+                "width": 2.4 if place == 0 else 1.4,
+            },
         )
     figure.update_xaxes(title_text="share of cases without an unknown above the threshold", range=[-0.01, 1])
     figure.update_yaxes(title_text="share of cases with one", range=[0, 1.01])
@@ -275,20 +271,18 @@ def strata_plot(rows: Sequence[Mapping[str, Any]]) -> Drawing:
         if not parts:
             continue
         names, values = list(parts), [part["value"] for part in parts.values()]
-        figure.add_trace(
-            go.Scatter(
-                x=names,
-                y=values,
-                error_y={
-                    "array": [(p["high"] or 0.0) - (p["value"] or 0.0) for p in parts.values()],
-                    "arrayminus": [(p["value"] or 0.0) - (p["low"] or 0.0) for p in parts.values()],
-                    "thickness": 1,
-                },
-                mode="lines+markers",
-                name=row["words"].replace(", d′ > 10", ""),
-                line={"color": style.SERIES[place % 7], "dash": style.DASHES[place % 7]},
-                marker={"symbol": style.MARKERS[place % 7], "size": 8},
-            )
+        figure.add_scatter(
+            x=names,
+            y=values,
+            error_y={
+                "array": [(p["high"] or 0.0) - (p["value"] or 0.0) for p in parts.values()],
+                "arrayminus": [(p["value"] or 0.0) - (p["low"] or 0.0) for p in parts.values()],
+                "thickness": 1,
+            },
+            mode="lines+markers",
+            name=row["words"].replace(", d′ > 10", ""),
+            line={"color": style.SERIES[place % 7], "dash": style.DASHES[place % 7]},
+            marker={"symbol": style.MARKERS[place % 7], "size": 8},
         )
         told.append(f"{row['words']}: {', '.join(percent(value) for value in values)}")
     figure.update_xaxes(title_text="d′ of the weakest missing effect", type="category")

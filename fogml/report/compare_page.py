@@ -186,14 +186,12 @@ def rms_bars(judgements: Mapping[str, Judgement], order: Sequence[str]) -> Drawi
             },
         )
     )
-    figure.add_trace(
-        go.Scatter(
-            x=stability,
-            y=list(order),
-            mode="markers",
-            name="bias stability",
-            marker={"symbol": "diamond", "size": 9, "color": style.BLACK},
-        )
+    figure.add_scatter(
+        x=stability,
+        y=list(order),
+        mode="markers",
+        name="bias stability",
+        marker={"symbol": "diamond", "size": 9, "color": style.BLACK},
     )
     figure.add_vline(x=floor, line=style.FLOOR_LINE)
     figure.add_trace(style.floor_in_legend())
@@ -235,9 +233,7 @@ def residuals_in_time(judgements: Mapping[str, Judgement], names: Sequence[str],
         per_unit, unit = time_unit(float(np.ptp(series.time)))
         x, y = drawn(series.time / per_unit, series.after, gaps=gap_starts(series.time))
         line = {"color": style.SERIES[row - 1], "width": 1.4}
-        figure.add_trace(
-            go.Scatter(x=x, y=y, mode="lines", name=name, line=line, showlegend=False), row=row, col=1
-        )
+        figure.add_scatter(x=x, y=y, mode="lines", name=name, line=line, showlegend=False, row=row, col=1)
         for value in (judged.floor, -judged.floor):
             figure.add_hline(y=value, row=row, col=1, line=style.FLOOR_LINE)
         figure.update_yaxes(title_text=f"{name}<br>[deg/h]", title_font_size=12, row=row, col=1)

@@ -32,15 +32,13 @@ def distribution(fleet: Mapping[str, Any]) -> Drawing:
         ("after", "after", style.GREEN, "solid"),
     ):
         values = sorted(unit[key] for unit in judged)
-        figure.add_trace(
-            go.Scatter(
-                x=values,
-                y=shares,
-                mode="lines+markers",
-                name=name,
-                line={"color": colour, "dash": dash, "shape": "hv"},
-                marker={"size": 5},
-            )
+        figure.add_scatter(
+            x=values,
+            y=shares,
+            mode="lines+markers",
+            name=name,
+            line={"color": colour, "dash": dash, "shape": "hv"},
+            marker={"size": 5},
         )
     floor = fleet["distribution"]["floor"]["median"]
     figure.add_vline(x=floor, line=style.FLOOR_LINE)
@@ -73,25 +71,21 @@ def by_unit(fleet: Mapping[str, Any], order: Sequence[Mapping[str, Any]], outlie
         ("after", "circle", style.GREEN),
         ("floor", "line-ew-open", style.BLACK),
     ):
-        figure.add_trace(
-            go.Scatter(
-                x=labels,
-                y=[unit[key] for unit in units],
-                mode="markers",
-                name="noise floor" if key == "floor" else key,
-                marker={"symbol": symbol, "size": 9, "color": colour},
-            )
+        figure.add_scatter(
+            x=labels,
+            y=[unit[key] for unit in units],
+            mode="markers",
+            name="noise floor" if key == "floor" else key,
+            marker={"symbol": symbol, "size": 9, "color": colour},
         )
     odd = [unit for unit in units if _label(unit) in outliers]
     if odd:
-        figure.add_trace(
-            go.Scatter(
-                x=[_label(unit) for unit in odd],
-                y=[unit["after"] for unit in odd],
-                mode="markers",
-                name="unlike the others",
-                marker=style.ring(17),
-            )
+        figure.add_scatter(
+            x=[_label(unit) for unit in odd],
+            y=[unit["after"] for unit in odd],
+            mode="markers",
+            name="unlike the others",
+            marker=style.ring(17),
         )
     every = [v for unit in units for v in (unit["before"], unit["after"], unit["floor"]) if v and v > 0]
     figure.update_yaxes(title_text="rms [deg/h], logarithmic", **log_axis(min(every), max(every)))
@@ -116,15 +110,13 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
     for place, name in enumerate(names):
         row, column = place // _COLUMNS + 1, place % _COLUMNS + 1
         mean, std = found["mean"][place], found["std"][place]
-        figure.add_trace(
-            go.Scatter(
-                x=labels,
-                y=values[:, place],
-                mode="markers",
-                error_y={"type": "data", "array": errors[:, place], "thickness": 1, "width": 2},
-                marker={"size": 7, "color": style.BLUE},
-                showlegend=False,
-            ),
+        figure.add_scatter(
+            x=labels,
+            y=values[:, place],
+            mode="markers",
+            error_y={"type": "data", "array": errors[:, place], "thickness": 1, "width": 2},
+            marker={"size": 7, "color": style.BLUE},
+            showlegend=False,
             row=row,
             col=column,
         )

@@ -34,33 +34,27 @@ def how_far_strip(items: Sequence[HowFar], named: bool) -> Drawing:
     labels = [item.run for item in items]
     figure = go.Figure()
     for item in items:
-        figure.add_trace(
-            go.Scatter(
-                x=[item.before, item.recalibrated, item.after],
-                y=[item.run] * 3,
-                mode="lines",
-                line={"color": style.GREY, "width": 1.2},
-                showlegend=False,
-                hoverinfo="skip",
-            )
+        figure.add_scatter(
+            x=[item.before, item.recalibrated, item.after],
+            y=[item.run] * 3,
+            mode="lines",
+            line={"color": style.GREY, "width": 1.2},
+            showlegend=False,
+            hoverinfo="skip",
         )
     for key, words, symbol, colour in _STAGES:
         if key == "after" and not named:
             continue
         marker = {"symbol": symbol, "color": colour, "size": 12, "line": {"width": 2}}
-        figure.add_trace(
-            go.Scatter(
-                x=[getattr(item, key) for item in items], y=labels, mode="markers", name=words, marker=marker
-            )
+        figure.add_scatter(
+            x=[getattr(item, key) for item in items], y=labels, mode="markers", name=words, marker=marker
         )
-    figure.add_trace(
-        go.Scatter(
-            x=[item.floor for item in items],
-            y=labels,
-            mode="markers",
-            name="noise floor",
-            marker={"symbol": "line-ns", "size": 18, "line": {"width": 2.5, "color": style.FLOOR}},
-        )
+    figure.add_scatter(
+        x=[item.floor for item in items],
+        y=labels,
+        mode="markers",
+        name="noise floor",
+        marker={"symbol": "line-ns", "size": 18, "line": {"width": 2.5, "color": style.FLOOR}},
     )
     values = [v for i in items for v in (i.before, i.recalibrated, i.after, i.floor) if v > 0.0] or [1.0]
     over = averages(items[0].averaging_s)
@@ -178,14 +172,12 @@ def _mark_segments(figure: go.Figure, segments: Sequence[GapSegment], per_unit: 
     x: list[float | None] = []
     for segment in segments:
         x += [segment.from_s / per_unit, segment.to_s / per_unit, None]
-    figure.add_trace(
-        go.Scatter(
-            x=x,
-            y=[height if value is not None else None for value in x],
-            mode="lines",
-            name="over the floor",
-            line={"color": style.VERMILION, "width": 7},
-        ),
+    figure.add_scatter(
+        x=x,
+        y=[height if value is not None else None for value in x],
+        mode="lines",
+        name="over the floor",
+        line={"color": style.VERMILION, "width": 7},
         row=3,
         col=1,
     )
@@ -255,16 +247,14 @@ def against_temperature(found: Diagnosis) -> Drawing:
                 continue
             rows = rows[min_max_indices(values[rows], DRAWN_POINTS // 2)]
             marker = {"color": colour, "symbol": symbol, "size": 5.5, "opacity": 0.6}
-            figure.add_trace(
-                go.Scatter(
-                    x=temperature[rows],
-                    y=values[rows],
-                    mode="markers",
-                    name=words,
-                    legendgroup=words,
-                    showlegend=column == 1,
-                    marker=marker,
-                ),
+            figure.add_scatter(
+                x=temperature[rows],
+                y=values[rows],
+                mode="markers",
+                name=words,
+                legendgroup=words,
+                showlegend=column == 1,
+                marker=marker,
                 row=1,
                 col=column,
             )
@@ -299,7 +289,7 @@ def _means(figure: go.Figure, bins: Sequence[TemperatureExcess]) -> None:
         if points:
             x, y = zip(*points, strict=True)
             line = {"color": colour, "width": 3, "dash": dash}
-            figure.add_trace(go.Scatter(x=x, y=y, mode="lines", name=words, line=line), row=1, col=1)
+            figure.add_scatter(x=x, y=y, mode="lines", name=words, line=line, row=1, col=1)
 
 
 def _parted(bins: Sequence[TemperatureExcess]) -> str:

@@ -47,19 +47,17 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
     for status, (colour, pattern) in _LOOKS.items():
         rows = [e for e in shown if e.status == status]
         if rows:
-            figure.add_trace(
-                go.Bar(
-                    x=[_folded(e.gain) for e in rows],
-                    y=[e.title for e in rows],
-                    orientation="h",
-                    name=STATUS_WORDS[status],
-                    marker={
-                        "color": colour,
-                        "pattern": {"shape": pattern, "fillmode": "overlay", "fgcolor": "white", "size": 6},
-                    },
-                    customdata=[e.gain for e in rows],
-                    hovertemplate="%{y}: %{customdata:.3g} nats<extra></extra>",
-                ),
+            figure.add_bar(
+                x=[_folded(e.gain) for e in rows],
+                y=[e.title for e in rows],
+                orientation="h",
+                name=STATUS_WORDS[status],
+                marker={
+                    "color": colour,
+                    "pattern": {"shape": pattern, "fillmode": "overlay", "fgcolor": "white", "size": 6},
+                },
+                customdata=[e.gain for e in rows],
+                hovertemplate="%{y}: %{customdata:.3g} nats<extra></extra>",
                 row=1,
                 col=1,
             )
@@ -70,15 +68,13 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
     ):
         rows = [e for e in shown if (e.usual_length < _LEAST_DRAWN) is small]
         if rows:
-            figure.add_trace(
-                go.Scatter(
-                    x=[max(e.usual_length, _LEAST_DRAWN) for e in rows],
-                    y=[e.title for e in rows],
-                    mode="markers",
-                    name=words,
-                    showlegend=small,
-                    marker={"symbol": symbol, "size": 9, "color": style.BLACK, "line": {"width": 1.8}},
-                ),
+            figure.add_scatter(
+                x=[max(e.usual_length, _LEAST_DRAWN) for e in rows],
+                y=[e.title for e in rows],
+                mode="markers",
+                name=words,
+                showlegend=small,
+                marker={"symbol": symbol, "size": 9, "color": style.BLACK, "line": {"width": 1.8}},
                 row=1,
                 col=2,
             )
@@ -133,16 +129,14 @@ def amplitude_by_run(found: Found, names: dict[str, str]) -> Drawing:
         x0=value - Z90 * se, x1=value + Z90 * se, fillcolor="rgba(0, 158, 115, 0.18)", line_width=0
     )
     figure.add_vline(x=value, line={"color": style.AFTER, "width": 1.6})
-    figure.add_trace(
-        go.Scatter(
-            x=[item.value for item in found.by_run],
-            y=labels,
-            mode="markers",
-            name="one run alone",
-            showlegend=False,
-            marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
-            error_x={"type": "data", "array": [Z90 * item.se for item in found.by_run], "width": 5},
-        )
+    figure.add_scatter(
+        x=[item.value for item in found.by_run],
+        y=labels,
+        mode="markers",
+        name="one run alone",
+        showlegend=False,
+        marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
+        error_x={"type": "data", "array": [Z90 * item.se for item in found.by_run], "width": 5},
     )
     figure.add_vline(x=0.0, line={"color": style.BLACK, "width": 1, "dash": "dot"})
     figure.update_xaxes(title_text=f"amplitude [{unit}]")
@@ -169,16 +163,14 @@ def constants_moved(constants: Sequence[ConstantFit]) -> Drawing:
     figure = go.Figure()
     for reach, tint in ((2.0, "rgba(0, 114, 178, 0.08)"), (1.0, "rgba(0, 114, 178, 0.14)")):
         figure.add_vrect(x0=-reach, x1=reach, fillcolor=tint, line_width=0)
-    figure.add_trace(
-        go.Scatter(
-            x=[(c.value - c.prior_mean) / c.prior_sd for c in shown],
-            y=labels,
-            mode="markers",
-            name="fitted",
-            showlegend=False,
-            marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
-            error_x={"type": "data", "array": [Z90 * c.se / c.prior_sd for c in shown], "width": 5},
-        )
+    figure.add_scatter(
+        x=[(c.value - c.prior_mean) / c.prior_sd for c in shown],
+        y=labels,
+        mode="markers",
+        name="fitted",
+        showlegend=False,
+        marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
+        error_x={"type": "data", "array": [Z90 * c.se / c.prior_sd for c in shown], "width": 5},
     )
     figure.update_xaxes(title_text="fitted less prior mean [prior standard deviations]")
     figure.update_yaxes(categoryorder="array", categoryarray=labels[::-1], type="category")

@@ -151,17 +151,15 @@ def by_temperature(bins: Sequence[TemperatureExcess]) -> Drawing:
     ):
         rows = [b for b in bins if b.significant is wanted]
         if rows:
-            figure.add_trace(
-                go.Bar(
-                    x=[0.5 * (b.from_degc + b.to_degc) for b in rows],
-                    y=[b.excess_rms for b in rows],
-                    width=[0.9 * (b.to_degc - b.from_degc) for b in rows],
-                    name=words,
-                    marker={
-                        "color": colour,
-                        "pattern": {"shape": pattern, "fillmode": "overlay", "fgcolor": "white"},
-                    },
-                )
+            figure.add_bar(
+                x=[0.5 * (b.from_degc + b.to_degc) for b in rows],
+                y=[b.excess_rms for b in rows],
+                width=[0.9 * (b.to_degc - b.from_degc) for b in rows],
+                name=words,
+                marker={
+                    "color": colour,
+                    "pattern": {"shape": pattern, "fillmode": "overlay", "fgcolor": "white"},
+                },
             )
     figure.update_xaxes(title_text="T [°C]")
     figure.update_yaxes(title_text="excess rms [deg/h]", rangemode="tozero")

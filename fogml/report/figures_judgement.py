@@ -172,17 +172,15 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
     )
     for other in train:
         kept = min_max_indices(other.series.before, DRAWN_POINTS // 4)
-        figure.add_trace(
-            go.Scatter(
-                x=other.series.temperature[kept],
-                y=other.series.before[kept],
-                mode="markers",
-                name="training runs",
-                legendgroup="train",
-                showlegend=other is train[0],
-                hovertext=other.run,
-                marker={"symbol": "x-thin", "size": 6, "line": {"color": style.TRAINING, "width": 1}},
-            ),
+        figure.add_scatter(
+            x=other.series.temperature[kept],
+            y=other.series.before[kept],
+            mode="markers",
+            name="training runs",
+            legendgroup="train",
+            showlegend=other is train[0],
+            hovertext=other.run,
+            marker={"symbol": "x-thin", "size": 6, "line": {"color": style.TRAINING, "width": 1}},
             row=1,
             col=1,
         )
@@ -193,23 +191,25 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
             continue
         for column, values in ((1, series.before), (2, series.after)):
             kept = rows[min_max_indices(values[rows], DRAWN_POINTS // 2)]
-            figure.add_trace(
-                go.Scatter(
-                    x=series.temperature[kept],
-                    y=values[kept],
-                    mode="markers",
-                    name=words,
-                    legendgroup=words,
-                    showlegend=column == 1,
-                    marker={"color": colour, "symbol": symbol, "size": 5.5, "opacity": 0.75},
-                ),
+            figure.add_scatter(
+                x=series.temperature[kept],
+                y=values[kept],
+                mode="markers",
+                name=words,
+                legendgroup=words,
+                showlegend=column == 1,
+                marker={"color": colour, "symbol": symbol, "size": 5.5, "opacity": 0.75},
                 row=1,
                 col=column,
             )
     x, y = drawn(series.time, series.before - series.after)
     temperature = np.interp(x, series.time, series.temperature)
-    figure.add_trace(
-        go.Scatter(x=temperature, y=y, mode="lines", name="model", line={"color": style.BLACK, "width": 1.8}),
+    figure.add_scatter(
+        x=temperature,
+        y=y,
+        mode="lines",
+        name="model",
+        line={"color": style.BLACK, "width": 1.8},
         row=1,
         col=1,
     )
@@ -258,9 +258,7 @@ def rms_by_regime(judged: RunJudgement) -> Drawing:
         (("before", style.BEFORE, "diamond-open"), ("after", style.AFTER, "circle")), start=1
     ):
         marker = {"symbol": symbol, "color": colour, "size": 11, "line": {"width": 2}}
-        figure.add_trace(
-            go.Scatter(x=[row[index] for row in rows], y=labels, mode="markers", name=name, marker=marker)
-        )
+        figure.add_scatter(x=[row[index] for row in rows], y=labels, mode="markers", name=name, marker=marker)
     floor = judged.floor
     figure.add_vline(x=floor, line=style.FLOOR_LINE)
     figure.add_trace(style.floor_in_legend())

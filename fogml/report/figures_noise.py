@@ -56,46 +56,40 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
     figure = go.Figure()
     intervals = np.asarray(noise["ci"], dtype=np.float64) if len(noise.get("ci", ())) == len(taus) else None
     if intervals is not None and len(taus):
-        figure.add_trace(
-            go.Scatter(
-                x=np.concatenate([taus, taus[::-1]]),
-                y=np.concatenate([intervals[:, 1], intervals[::-1, 0]]),
-                fill="toself",
-                mode="lines",
-                line={"width": 0, "color": style.BLUE},
-                fillcolor="rgba(0, 114, 178, 0.20)",
-                name=f"{100 * float(noise.get('level', 0.9)):.0f} % interval",
-                hoverinfo="skip",
-            )
+        figure.add_scatter(
+            x=np.concatenate([taus, taus[::-1]]),
+            y=np.concatenate([intervals[:, 1], intervals[::-1, 0]]),
+            fill="toself",
+            mode="lines",
+            line={"width": 0, "color": style.BLUE},
+            fillcolor="rgba(0, 114, 178, 0.20)",
+            name=f"{100 * float(noise.get('level', 0.9)):.0f} % interval",
+            hoverinfo="skip",
         )
     shown = _term_lines(figure, noise, taus, adev)
     shown += _model_lines(figure, noise, taus)
     shown += _floor_line(figure, noise)
-    figure.add_trace(
-        go.Scatter(
-            x=taus,
-            y=adev,
-            mode="lines+markers",
-            name="Allan deviation",
-            line={"color": style.BLUE, "width": 2},
-            marker={"size": 5},
-        )
+    figure.add_scatter(
+        x=taus,
+        y=adev,
+        mode="lines+markers",
+        name="Allan deviation",
+        line={"color": style.BLUE, "width": 2},
+        marker={"size": 5},
     )
     minimum = noise.get("minimum") or {}
     if minimum.get("adev"):
-        figure.add_trace(
-            go.Scatter(
-                x=[minimum["tau_s"]],
-                y=[minimum["adev"]],
-                mode="markers",
-                name="minimum",
-                marker={
-                    "symbol": "star",
-                    "size": 14,
-                    "color": style.YELLOW,
-                    "line": {"width": 1, "color": style.BLACK},
-                },
-            )
+        figure.add_scatter(
+            x=[minimum["tau_s"]],
+            y=[minimum["adev"]],
+            mode="markers",
+            name="minimum",
+            marker={
+                "symbol": "star",
+                "size": 14,
+                "color": style.YELLOW,
+                "line": {"width": 1, "color": style.BLACK},
+            },
         )
     figure.update_xaxes(title_text="averaging time τ [s]", **log_axis(taus[0], taus[-1], room=0.03))
     figure.update_yaxes(
@@ -124,14 +118,12 @@ def _model_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray) 
     model = noise.get("model") or {}
     told = ""
     if len(model.get("adev", ())) == len(taus):
-        figure.add_trace(
-            go.Scatter(
-                x=taus,
-                y=model["adev"],
-                mode="lines",
-                name="noise model",
-                line={"color": style.BLACK, "width": 1.2},
-            )
+        figure.add_scatter(
+            x=taus,
+            y=model["adev"],
+            mode="lines",
+            name="noise model",
+            line={"color": style.BLACK, "width": 1.2},
         )
         told = " Thin black: the fitted model"
         if noise.get("filter") and noise["filter"]["kind"] != "other":
@@ -157,20 +149,16 @@ def _floor_line(figure: go.Figure, noise: Mapping[str, Any]) -> str:
     times, intervals = floor["averaging_s"], np.asarray(floor["ci"], dtype=np.float64)
     for side in (0, 1):
         line = {**style.FLOOR_LINE, "width": 0.6}
-        figure.add_trace(
-            go.Scatter(
-                x=times, y=intervals[:, side], mode="lines", line=line, showlegend=False, hoverinfo="skip"
-            )
+        figure.add_scatter(
+            x=times, y=intervals[:, side], mode="lines", line=line, showlegend=False, hoverinfo="skip"
         )
-    figure.add_trace(
-        go.Scatter(
-            x=times,
-            y=floor["value"],
-            mode="lines" if len(times) > 1 else "markers",
-            name="noise floor",
-            line=style.FLOOR_LINE,
-            marker={"symbol": "line-ew-open", "size": 14, "color": style.FLOOR_LINE["color"]},
-        )
+    figure.add_scatter(
+        x=times,
+        y=floor["value"],
+        mode="lines" if len(times) > 1 else "markers",
+        name="noise floor",
+        line=style.FLOOR_LINE,
+        marker={"symbol": "line-ew-open", "size": 14, "color": style.FLOOR_LINE["color"]},
     )
     return (
         f" Dashed: the noise floor that drift models are held against, with its interval: the standard "
@@ -198,9 +186,7 @@ def _term_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray, a
             "dash": ("dot", "dash", "longdash", "dashdot", "longdashdot")[index],
             "width": 1.6,
         }
-        figure.add_trace(
-            go.Scatter(x=taus[near], y=alone[near], mode="lines", name=f"{name} {words}", line=line)
-        )
+        figure.add_scatter(x=taus[near], y=alone[near], mode="lines", name=f"{name} {words}", line=line)
     if not drawn:
         return "The data support none."
     return (

@@ -32,37 +32,31 @@ def history(study: Mapping[str, Any]) -> Drawing:
             "size": 8,
             "color": style.SERIES[place % len(style.SERIES)],
         }
-        figure.add_trace(
-            go.Scatter(
-                x=[t["number"] for t in own],
-                y=[t["rms"] for t in own],
-                mode="markers",
-                name=model,
-                marker=marker,
-                text=[t["features"] for t in own],
-            )
+        figure.add_scatter(
+            x=[t["number"] for t in own],
+            y=[t["rms"] for t in own],
+            mode="markers",
+            name=model,
+            marker=marker,
+            text=[t["features"] for t in own],
         )
     best = np.minimum.accumulate(errors)
-    figure.add_trace(
-        go.Scatter(
-            x=numbers,
-            y=best,
-            mode="lines",
-            name="best so far",
-            line={"color": style.BLACK, "width": 1.5, "shape": "hv"},
-        )
+    figure.add_scatter(
+        x=numbers,
+        y=best,
+        mode="lines",
+        name="best so far",
+        line={"color": style.BLACK, "width": 1.5, "shape": "hv"},
     )
     low, high = float(errors.min()), float(errors.max())
     axis = log_axis(low, max(high, 1.02 * low), room=0.12)
     if pruned:
-        figure.add_trace(
-            go.Scatter(
-                x=pruned,
-                y=[10.0 ** (axis["range"][0] + 0.03 * (axis["range"][1] - axis["range"][0]))] * len(pruned),
-                mode="markers",
-                name="pruned or refused",
-                marker={"symbol": "line-ns-open", "size": 9, "color": style.PURPLE},
-            )
+        figure.add_scatter(
+            x=pruned,
+            y=[10.0 ** (axis["range"][0] + 0.03 * (axis["range"][1] - axis["range"][0]))] * len(pruned),
+            mode="markers",
+            name="pruned or refused",
+            marker={"symbol": "line-ns-open", "size": 9, "color": style.PURPLE},
         )
     figure.update_xaxes(title_text="trial")
     figure.update_yaxes(title_text="held-out rms [deg/h], logarithmic", **axis)
@@ -116,28 +110,24 @@ def pareto_front(study: Mapping[str, Any]) -> Drawing:
     for column, (cost, title) in enumerate(_COSTS.items(), start=1):
         shown = column == 1
         _points(figure, trials, cost, column, shown)
-        figure.add_trace(
-            go.Scatter(
-                x=[t[cost] for t in front],
-                y=[t["rms"] for t in front],
-                mode="markers",
-                name="in the Pareto set",
-                marker={"symbol": "diamond", "size": 10, "color": style.BLUE},
-                text=[f"{t['model']}: {t['features']}" for t in front],
-                showlegend=shown,
-            ),
+        figure.add_scatter(
+            x=[t[cost] for t in front],
+            y=[t["rms"] for t in front],
+            mode="markers",
+            name="in the Pareto set",
+            marker={"symbol": "diamond", "size": 10, "color": style.BLUE},
+            text=[f"{t['model']}: {t['features']}" for t in front],
+            showlegend=shown,
             row=1,
             col=column,
         )
-        figure.add_trace(
-            go.Scatter(
-                x=[best[cost]],
-                y=[best["rms"]],
-                mode="markers",
-                name="winner",
-                marker=style.ring(18),
-                showlegend=shown,
-            ),
+        figure.add_scatter(
+            x=[best[cost]],
+            y=[best["rms"]],
+            mode="markers",
+            name="winner",
+            marker=style.ring(18),
+            showlegend=shown,
             row=1,
             col=column,
         )
@@ -167,16 +157,14 @@ def pareto_front(study: Mapping[str, Any]) -> Drawing:
 def _points(
     figure: go.Figure, trials: Sequence[Mapping[str, Any]], cost: str, column: int, shown: bool
 ) -> None:
-    figure.add_trace(
-        go.Scatter(
-            x=[max(t[cost], 1) for t in trials],
-            y=[t["rms"] for t in trials],
-            mode="markers",
-            name="other trials",
-            marker={"symbol": "circle", "size": 6, "color": "#9AA1AA"},
-            text=[f"{t['model']}: {t['features']}" for t in trials],
-            showlegend=shown,
-        ),
+    figure.add_scatter(
+        x=[max(t[cost], 1) for t in trials],
+        y=[t["rms"] for t in trials],
+        mode="markers",
+        name="other trials",
+        marker={"symbol": "circle", "size": 6, "color": "#9AA1AA"},
+        text=[f"{t['model']}: {t['features']}" for t in trials],
+        showlegend=shown,
         row=1,
         col=column,
     )

@@ -266,23 +266,21 @@ def line_figure(line: Mapping[str, Any]) -> Drawing:
     ):
         middle = [100.0 * cause[key] for cause in causes]
         ends = [[100.0 * end for end in cause[f"{key}_ci90"]] for cause in causes]
-        figure.add_trace(
-            go.Scatter(
-                x=middle,
-                y=names,
-                mode="markers",
-                name=words,
-                marker={"size": 9, "color": colour, "symbol": symbol},
-                error_x={
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [max(high - m, 0.0) for m, (_, high) in zip(middle, ends, strict=True)],
-                    "arrayminus": [max(m - low, 0.0) for m, (low, _) in zip(middle, ends, strict=True)],
-                    "thickness": 1,
-                    "width": 3,
-                    "color": colour,
-                },
-            )
+        figure.add_scatter(
+            x=middle,
+            y=names,
+            mode="markers",
+            name=words,
+            marker={"size": 9, "color": colour, "symbol": symbol},
+            error_x={
+                "type": "data",
+                "symmetric": False,
+                "array": [max(high - m, 0.0) for m, (_, high) in zip(middle, ends, strict=True)],
+                "arrayminus": [max(m - low, 0.0) for m, (low, _) in zip(middle, ends, strict=True)],
+                "thickness": 1,
+                "width": 3,
+                "color": colour,
+            },
         )
     figure.update_xaxes(title_text="share [%]", range=[0, 102])
     style.styled(figure, 130 + 34 * len(names))

@@ -208,16 +208,14 @@ def loops(judgements: Mapping[str, Judgement]) -> Drawing:
         model = (test.series.before - test.series.after)[kept]
         _line(figure, 1, column, test.series.temperature[kept], model, "model on the test run", style.BLACK)
         marker = {"color": style.AFTER, "symbol": "circle", "size": 4.5, "opacity": 0.8}
-        figure.add_trace(
-            go.Scatter(
-                x=test.series.temperature[kept],
-                y=test.series.after[kept],
-                mode="markers",
-                marker=marker,
-                name="left on the test run",
-                legendgroup="left",
-                showlegend=column == 1,
-            ),
+        figure.add_scatter(
+            x=test.series.temperature[kept],
+            y=test.series.after[kept],
+            mode="markers",
+            marker=marker,
+            name="left on the test run",
+            legendgroup="left",
+            showlegend=column == 1,
             row=2,
             col=column,
         )
@@ -250,17 +248,15 @@ def _points(
     figure: go.Figure, column: int, series: AveragedSeries, name: str, colour: str, symbol: str
 ) -> None:
     kept = min_max_indices(series.before, DRAWN_POINTS // 2)
-    figure.add_trace(
-        go.Scatter(
-            x=series.temperature[kept],
-            y=series.before[kept],
-            mode="markers",
-            marker={"color": colour, "symbol": symbol, "size": 4.5, "opacity": 0.7},
-            name=name.split(":")[0] + " run",
-            hovertext=name,
-            legendgroup=name.split(":")[0],
-            showlegend=column == 1,
-        ),
+    figure.add_scatter(
+        x=series.temperature[kept],
+        y=series.before[kept],
+        mode="markers",
+        marker={"color": colour, "symbol": symbol, "size": 4.5, "opacity": 0.7},
+        name=name.split(":")[0] + " run",
+        hovertext=name,
+        legendgroup=name.split(":")[0],
+        showlegend=column == 1,
         row=1,
         col=column,
     )

@@ -257,7 +257,7 @@ def recording(run: Run) -> Drawing:
 def _output(figure: go.Figure, run: Run, time: FloatArray, per_unit: float) -> None:
     x, y = drawn(time, run.gyro, gaps=run.gap_starts)
     line = {"color": style.TRAINING, "width": 0.8}
-    figure.add_trace(go.Scatter(x=x, y=y, mode="lines", name="output, all samples", line=line), row=1, col=1)
+    figure.add_scatter(x=x, y=y, mode="lines", name="output, all samples", line=line, row=1, col=1)
     window_s = rounded_up(max(run.span_s / _AVERAGES, 20.0 * run.sample_s, 1e-6))
     means = block_averages(run.time, run.gyro, window_s=window_s) if run.span_s > 4.0 * window_s else None
     if means is not None and len(means) > 2:
@@ -265,7 +265,7 @@ def _output(figure: go.Figure, run: Run, time: FloatArray, per_unit: float) -> N
         x, y = drawn(means.time_s / per_unit, means.values[0], gaps=gaps)
         line = {"color": style.BEFORE, "width": 1.6}
         name = f"output, {number(window_s)} s averages"
-        figure.add_trace(go.Scatter(x=x, y=y, mode="lines", name=name, line=line), row=1, col=1)
+        figure.add_scatter(x=x, y=y, mode="lines", name=name, line=line, row=1, col=1)
 
 
 def _line(

@@ -145,18 +145,14 @@ def slopes_over_tilts(values: Mapping[str, Any]) -> Drawing:
         colour, name = style.SERIES[index], f"state {state['state']}"
         line = {"color": colour, "dash": style.DASHES[index], "width": 1.6}
         marker = {"symbol": style.MARKERS[index], "size": 9, "color": colour}
-        figure.add_trace(
-            go.Scatter(x=fine, y=curve, mode="lines", line=line, showlegend=False, hoverinfo="skip"),
-            row=1,
-            col=1,
+        figure.add_scatter(
+            x=fine, y=curve, mode="lines", line=line, showlegend=False, hoverinfo="skip", row=1, col=1
         )
-        figure.add_trace(
-            go.Scatter(x=tilts, y=state["slopes"], mode="markers", name=name, marker=marker), row=1, col=1
-        )
+        figure.add_scatter(x=tilts, y=state["slopes"], mode="markers", name=name, marker=marker, row=1, col=1)
         residuals = 1e6 * np.asarray(state["residuals"]) / values["K"]
         left = max(left, float(np.abs(residuals).max()))
-        figure.add_trace(
-            go.Scatter(x=tilts, y=residuals, mode="markers", marker=marker, showlegend=False), row=2, col=1
+        figure.add_scatter(
+            x=tilts, y=residuals, mode="markers", marker=marker, showlegend=False, row=2, col=1
         )
     figure.update_yaxes(title_text=f"slope [{values['unit']}]", row=1, col=1)
     figure.update_yaxes(title_text="left over [ppm of K]", row=2, col=1)
@@ -179,25 +175,21 @@ def region_figure(values: Mapping[str, Any]) -> Drawing | None:
         return None
     outline = np.asarray(region["outline_deg"])
     figure = go.Figure()
-    figure.add_trace(
-        go.Scatter(
-            x=outline[:, 0],
-            y=outline[:, 1],
-            mode="lines",
-            fill="toself",
-            fillcolor="rgba(0, 114, 178, 0.18)",
-            line={"color": style.BLUE, "width": 1.4},
-            name=f"{region['level']:.0%} region",
-        )
+    figure.add_scatter(
+        x=outline[:, 0],
+        y=outline[:, 1],
+        mode="lines",
+        fill="toself",
+        fillcolor="rgba(0, 114, 178, 0.18)",
+        line={"color": style.BLUE, "width": 1.4},
+        name=f"{region['level']:.0%} region",
     )
-    figure.add_trace(
-        go.Scatter(
-            x=[values["delta_x_deg"]],
-            y=[values["delta_y_deg"]],
-            mode="markers",
-            name="four states",
-            marker={"symbol": "cross", "size": 11, "color": style.BLUE},
-        )
+    figure.add_scatter(
+        x=[values["delta_x_deg"]],
+        y=[values["delta_y_deg"]],
+        mode="markers",
+        name="four states",
+        marker={"symbol": "cross", "size": 11, "color": style.BLUE},
     )
     figure.update_xaxes(title_text="misalignment x [deg]", tickformat=".6~g", nticks=5)
     figure.update_yaxes(title_text="misalignment y [deg]", tickformat=".6~g")

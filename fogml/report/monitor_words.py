@@ -108,24 +108,22 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
     age = unit["age"]
     for row, name in enumerate(told, start=1):
         values = [shown_figure(run, name) for run in unit["runs"]]
-        figure.add_trace(
-            go.Scatter(
-                x=age,
-                y=values,
-                mode="lines+markers",
-                error_y={
-                    "type": "data",
-                    **_bars(unit["runs"], name),
-                    "color": style.TRAINING,
-                    "thickness": 1,
-                    "width": 2,
-                },
-                line={"color": style.TRAINING, "width": 1},
-                marker={"size": 7, "color": style.BLUE},
-                customdata=[run["run"] for run in unit["runs"]],
-                hovertemplate="%{customdata}<br>%{y:.4g}<extra></extra>",
-                showlegend=False,
-            ),
+        figure.add_scatter(
+            x=age,
+            y=values,
+            mode="lines+markers",
+            error_y={
+                "type": "data",
+                **_bars(unit["runs"], name),
+                "color": style.TRAINING,
+                "thickness": 1,
+                "width": 2,
+            },
+            line={"color": style.TRAINING, "width": 1},
+            marker={"size": 7, "color": style.BLUE},
+            customdata=[run["run"] for run in unit["runs"]],
+            hovertemplate="%{customdata}<br>%{y:.4g}<extra></extra>",
+            showlegend=False,
             row=row,
             col=1,
         )
@@ -149,15 +147,13 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
                     x=alarm["onset_age"], line={"color": style.VERMILION, "width": 2}, row=row, col=1
                 )
                 raised = alarm["raised_at_index"]
-                figure.add_trace(
-                    go.Scatter(
-                        x=[age[raised]],
-                        y=[values[raised]],
-                        mode="markers",
-                        marker=style.ring(16),
-                        showlegend=False,
-                        hoverinfo="skip",
-                    ),
+                figure.add_scatter(
+                    x=[age[raised]],
+                    y=[values[raised]],
+                    mode="markers",
+                    marker=style.ring(16),
+                    showlegend=False,
+                    hoverinfo="skip",
                     row=row,
                     col=1,
                 )
@@ -210,14 +206,12 @@ def evidence(unit: Mapping[str, Any], limit: float) -> Drawing:
         )
     )
     figure.add_hline(y=limit, line={"color": style.VERMILION, "dash": "dash", "width": 1.5})
-    figure.add_trace(
-        go.Scatter(
-            x=[None],
-            y=[None],
-            mode="lines",
-            name="limit",
-            line={"color": style.VERMILION, "dash": "dash", "width": 1.5},
-        )
+    figure.add_scatter(
+        x=[None],
+        y=[None],
+        mode="lines",
+        name="limit",
+        line={"color": style.VERMILION, "dash": "dash", "width": 1.5},
     )
     figure.update_yaxes(title_text="evidence, logarithmic", **log_axis(min(values), max(*values, 2 * limit)))
     figure.update_xaxes(title_text=_age_title(unit))
@@ -241,21 +235,19 @@ def levels(units: Sequence[Mapping[str, Any]]) -> Drawing:
         if not some:
             continue
         last = [units[i]["runs"][-1] for i in some]
-        figure.add_trace(
-            go.Scatter(
-                x=[labels[i] for i in some],
-                y=[run["level"] for run in last],
-                mode="markers",
-                name="changed" if state == "alarm" else "not changed",
-                marker={"symbol": symbol, "size": 10, "color": colour},
-                error_y={
-                    "type": "data",
-                    "array": [run["half_width"] for run in last],
-                    "thickness": 1,
-                    "width": 2,
-                    "color": style.TRAINING,
-                },
-            )
+        figure.add_scatter(
+            x=[labels[i] for i in some],
+            y=[run["level"] for run in last],
+            mode="markers",
+            name="changed" if state == "alarm" else "not changed",
+            marker={"symbol": symbol, "size": 10, "color": colour},
+            error_y={
+                "type": "data",
+                "array": [run["half_width"] for run in last],
+                "thickness": 1,
+                "width": 2,
+                "color": style.TRAINING,
+            },
         )
     serial_axis(figure, labels)
     figure.update_yaxes(title_text="bias left by the model [deg/h]", tickformat=".3~g")

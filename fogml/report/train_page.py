@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.report import figures_judgement, style
@@ -203,13 +202,9 @@ def navigation_figure(run: Mapping[str, Any], latitude_deg: float) -> Drawing:
     for when, colour, dash in (("before", style.BEFORE, "dot"), ("after", style.AFTER, "solid")):
         told = run[when][SHOWN_AXIS]
         line = {"color": colour, "width": 2, "dash": dash}
-        figure.add_trace(
-            go.Scatter(x=hours, y=told["position_km"], mode="lines", name=when, line=line), row=1, col=1
-        )
-        figure.add_trace(
-            go.Scatter(x=hours, y=told["heading_deg"], mode="lines", line=line, showlegend=False),
-            row=2,
-            col=1,
+        figure.add_scatter(x=hours, y=told["position_km"], mode="lines", name=when, line=line, row=1, col=1)
+        figure.add_scatter(
+            x=hours, y=told["heading_deg"], mode="lines", line=line, showlegend=False, row=2, col=1
         )
         last[when] = told["position_km"][-1]
     figure.update_yaxes(title_text="position error [km]", row=1, col=1)
