@@ -111,6 +111,17 @@ class Writer:
         self._names.add(fit.lower())
         return self.workbook.add_worksheet(fit)
 
+    def table_sheet(
+        self, name: str, heads: Sequence[str], rows: Sequence[Sequence[Any]], widths: Sequence[float] = ()
+    ) -> Worksheet:
+        """A new sheet of a table alone, its heads frozen, with the columns' widths, the last for the rest."""
+        sheet = self.sheet(name)
+        self.table(sheet, heads, rows)
+        for column, width in enumerate(widths):
+            sheet.set_column(column, column if column < len(widths) - 1 else len(heads) - 1, width)
+        sheet.freeze_panes(1, 0)
+        return sheet
+
     def table(
         self, sheet: Worksheet, heads: Sequence[str], rows: Sequence[Sequence[Any]], top: int = 0
     ) -> int:
@@ -179,20 +190,14 @@ def _summary(writer: Writer, judgement: Judgement) -> None:
 
 
 def _figures(writer: Writer, judgement: Judgement) -> None:
-    sheet = writer.sheet("Figures")
     rows: list[tuple[Any, ...]] = []
     for part, runs in (("test", judgement.test), ("train", judgement.train)):
         for run in runs:
             for when, metrics in (("before", run.before), ("after", run.after)):
                 values = (getattr(metrics, field.name) for field in fields(Metrics))
-                about = (
-                    run.floor,
-                    run.outside_training,
-                    run.rows_used,
-                    run.rows_left_out,
-                    run.bias_reference,
-                )
-                rows.append((run.run, part, when, run.unit, run.axis, run.averaging_s, *values, *about))
+                about = (run.floor, run.outside_training, run.rows_used, run.rows_left_out)
+                start = (run.run, part, when, run.unit, run.axis, run.averaging_s)
+                rows.append((*start, *values, *about, run.bias_reference))
     heads = ["run", "part", "when", "unit", "axis", "averaging [s]"]
     heads += [f"{label(field.name).lower()} [{unit_of(field.name)}]" for field in fields(Metrics)]
     heads += [
@@ -202,32 +207,21 @@ def _figures(writer: Writer, judgement: Judgement) -> None:
         "samples left out",
         "bias relative to",
     ]
-    writer.table(sheet, heads, rows)
-    sheet.set_column(0, 0, 26)
-    sheet.set_column(1, len(heads), 13)
-    sheet.freeze_panes(1, 1)
+    writer.table_sheet("Figures", heads, rows, (26, 13)).freeze_panes(1, 1)
 
 
 def _coefficients(writer: Writer, judgement: Judgement) -> None:
-    sheet = writer.sheet("Coefficients")
     heads = ("term", "coefficient [deg/h per unit of the term]", "standard error")
-    writer.table(sheet, heads, coefficients_of(judgement.model))
-    sheet.set_column(0, 2, 22)
-    sheet.freeze_panes(1, 0)
+    writer.table_sheet("Coefficients", heads, coefficients_of(judgement.model), (22,))
 
 
 def _findings(writer: Writer, judgement: Judgement) -> None:
-    sheet = writer.sheet("Findings and notes")
     rows = []
     for run in (*judgement.train, *judgement.test):
         rows += [(run.run, told.code, told.message, told.place) for told in noticed(run.findings)]
         rows += [(run.run, "note", note, "") for note in run.notes]
     rows += [("", "note", str(note), "") for note in (*judgement.notes, *judgement.model.get("notes", ()))]
-    writer.table(sheet, ("run", "code", "message", "place"), rows)
-    sheet.set_column(0, 1, 22)
-    sheet.set_column(2, 2, 100)
-    sheet.set_column(3, 3, 28)
-    sheet.freeze_panes(1, 0)
+    writer.table_sheet("Findings and notes", ("run", "code", "message", "place"), rows, (22, 22, 100, 28))
 
 
 def _averages(writer: Writer, name: str, run: RunJudgement) -> None:

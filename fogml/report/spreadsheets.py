@@ -15,20 +15,7 @@ _MORE = ("limit from", "limit to", "met", "of", "remark")
 
 
 def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
-    """Write an ``acceptance.json`` as an Excel workbook that appears whole or not at all.
-
-    Parameters
-    ----------
-    values
-        Schema ``fogml.acceptance/1``.
-    path
-        The file, ending in ``.xlsx``.
-
-    Raises
-    ------
-    InputError
-        If the folder is missing or can't be written.
-    """
+    """Write an ``acceptance.json`` (schema ``fogml.acceptance/1``) as a workbook, whole or not at all."""
     with whole_workbook(path) as writer:
         sheet = writer.sheet("Acceptance")
         sheet.write_string(0, 0, cell_text(named(values)), writer.title)
@@ -45,7 +32,6 @@ def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
         writer.table(sheet, (*_HEADS, *_MORE), rows, 3)
         sheet.set_column(0, 4, 24)
         sheet.set_column(5, 12, 14)
-        sheet = writer.sheet("Soaks")
         parts = ("start", "up", "down", "hysteresis")
         heads = [f"{part} {when} [deg/h]" for when in ("before", "after") for part in parts]
         lines = [
@@ -56,45 +42,27 @@ def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
             )
             for line in values["soaks"]
         ]
-        writer.table(sheet, ("run", "temperature [degC]", *heads), lines)
-        sheet.set_column(0, 9, 18)
-        sheet = writer.sheet("Runs")
+        writer.table_sheet("Soaks", ("run", "temperature [degC]", *heads), lines, (18,))
         runs = [
             (run["run"], run["started"], run["span_h"], *run["temperature_degC"], run["sha256"])
             for run in values["runs"]
         ]
-        writer.table(sheet, ("run", "started", "length [h]", "T from [degC]", "T to [degC]", "SHA-256"), runs)
-        sheet.set_column(0, 5, 20)
-        sheet = writer.sheet("Stands on")
+        columns = ("run", "started", "length [h]", "T from [degC]", "T to [degC]", "SHA-256")
+        writer.table_sheet("Runs", columns, runs, (20,))
         limits = values["limits"] or {}
         stated = [("date of issue", values["date"])]
         stated += [(key, limits.get(key)) for key in ("customer", "document")]
         stated += [(f"SHA-256 of {name}", digest) for name, digest in files_of(values)]
         stated += [("note", note) for note in values["notes"]]
-        writer.table(sheet, ("what", "value"), stated)
-        sheet.set_column(0, 1, 40)
+        writer.table_sheet("Stands on", ("what", "value"), stated, (40,))
 
 
 def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
-    """Write a ``batch.json`` as an Excel workbook, one line a unit; as `acceptance_spreadsheet`.
-
-    Parameters
-    ----------
-    values
-        Schema ``fogml.batch/1``.
-    path
-        The file, ending in ``.xlsx``.
-    """
+    """Write a ``batch.json`` (schema ``fogml.batch/1``), one line a unit; as `acceptance_spreadsheet`."""
     with whole_workbook(path) as writer:
-        sheet = writer.sheet("Units")
         keys = [one["quantity"] for one in values["quantities"]]
-        heads = [
-            "unit",
-            "axis",
-            "verdict",
-            "reasons",
-            *(f"{q['name']} [{q['unit']}]" for q in values["quantities"]),
-        ]
+        heads = ["unit", "axis", "verdict", "reasons"]
+        heads += [f"{q['name']} [{q['unit']}]" for q in values["quantities"]]
         rows = [
             (
                 one["serial_number"],
@@ -105,10 +73,7 @@ def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
             )
             for one in values["units"]
         ]
-        writer.table(sheet, heads, rows)
-        sheet.set_column(0, len(heads) - 1, 18)
-        sheet.freeze_panes(1, 1)
-        sheet = writer.sheet("Distribution")
+        writer.table_sheet("Units", heads, rows, (18,)).freeze_panes(1, 1)
         names = ("quantity", "unit", "tested", "least", "q10", "median", "q90", "largest", "limit", "over")
         told = [
             (
@@ -121,8 +86,7 @@ def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
             )
             for one in values["quantities"]
         ]
-        writer.table(sheet, names, told)
-        sheet.set_column(0, len(names) - 1, 18)
+        writer.table_sheet("Distribution", names, told, (18,))
 
 
 _UNIT_COLUMNS = (
@@ -151,46 +115,20 @@ _CAUSE_COLUMNS = (
 
 
 def fleet_spreadsheet(fleet: Mapping[str, Any], path: str | Path) -> None:
-    """Write a ``fleet.json`` as an Excel workbook that appears whole or not at all.
-
-    Parameters
-    ----------
-    fleet
-        Schema ``fogml.fleet/1``.
-    path
-        The file, ending in ``.xlsx``.
-
-    Raises
-    ------
-    InputError
-        If the folder is missing or can't be written.
-    """
+    """Write a ``fleet.json`` (schema ``fogml.fleet/1``) as `acceptance_spreadsheet`."""
     with whole_workbook(path) as writer:
-        sheet = writer.sheet("Units")
         rows = [[unit[key] for key, _ in _UNIT_COLUMNS] for unit in fleet["units"]]
-        writer.table(sheet, [head for _, head in _UNIT_COLUMNS], rows)
-        sheet.set_column(0, len(_UNIT_COLUMNS) - 1, 16)
-        sheet.freeze_panes(1, 1)
+        writer.table_sheet("Units", [head for _, head in _UNIT_COLUMNS], rows, (16,)).freeze_panes(1, 1)
         if "diagnosis" in fleet:
-            sheet = writer.sheet("Causes")
             rows = [[one[key] for key in _CAUSE_COLUMNS] for one in fleet["diagnosis"]["causes"]]
-            writer.table(sheet, [key.replace("_", " ") for key in _CAUSE_COLUMNS], rows)
+            writer.table_sheet("Causes", [key.replace("_", " ") for key in _CAUSE_COLUMNS], rows)
         if "constants" in fleet:
             found = fleet["constants"]
-            sheet = writer.sheet("Constants")
-            heads = [
-                "unit",
-                *found["names"],
-                *(f"{name}, standard error" for name in found["names"]),
-                "distance",
-            ]
+            errors = [f"{name}, standard error" for name in found["names"]]
+            heads = ["unit", *found["names"], *errors, "distance"]
             table = zip(found["units"], found["values"], found["se"], found["distance"], strict=True)
-            writer.table(sheet, heads, [[unit, *own, *se, far] for unit, own, se, far in table])
-            sheet.set_column(0, len(heads) - 1, 16)
-            sheet.freeze_panes(1, 1)
-        sheet = writer.sheet("Noticed")
+            rows = [[unit, *own, *se, far] for unit, own, se, far in table]
+            writer.table_sheet("Constants", heads, rows, (16,)).freeze_panes(1, 1)
         noticed = [(item["unit"], "needs another run", item["why"]) for item in fleet["again"]]
         noticed += [(item["unit"], "unlike the others", item["why"]) for item in fleet["outliers"]]
-        writer.table(sheet, ("unit", "what", "why"), noticed)
-        sheet.set_column(0, 1, 20)
-        sheet.set_column(2, 2, 100)
+        writer.table_sheet("Noticed", ("unit", "what", "why"), noticed, (20, 20, 100))
