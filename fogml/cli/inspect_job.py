@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
+from fogml.cli.results import tell
 from fogml.cli.run_commands import InspectSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
-from fogml.json_files import write_json
-from fogml.outputs import whole_folder
 from fogml.report.words import duration
 from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.run import Run
@@ -22,34 +20,32 @@ def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:
     """Look into the runs, write what was found where an output folder is named, and print it."""
     if not settings.runs:
         raise InputError("no run is given; name at least one")
-    if settings.out is None:
-        values = _inspect(settings, terminal)[1]
-    else:
-        with whole_folder(settings.out) as folder:
-            runs, values = _inspect(settings, terminal)
-            write_json(folder / "inspect.json", values)
-            with terminal.work("drawing"):
-                from fogml.report import inspect_page
+    runs: list[Run] = []
 
-                (folder / "inspect.html").write_text(inspect_page(runs, values), encoding="utf-8")
-            settings.write_into(folder, "inspect")
+    def make() -> dict[str, Any]:
+        # Findings are part of the result here, so they are not noted on stderr as well.
+        runs.extend(
+            open_runs(settings.runs, Terminal(quiet=True), repair=settings.repair, axis=settings.axis)
+        )
+        if settings.strict:
+            hold_strict([(run.name, run.findings) for run in runs])
+        with terminal.work("looking into the runs"):
+            return inspection_json(runs)
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report import inspect_page
+
+        return inspect_page(runs, values)
+
+    tell("inspect", settings, terminal, make, page, _print)
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
     for run in values["runs"]:
-        _print(run, terminal)
-    terminal.result(values)
-    if settings.out is not None:
-        terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'inspect.html'}")
+        _print_run(run, terminal)
 
 
-def _inspect(settings: InspectSettings, terminal: Terminal) -> tuple[list[Run], dict[str, Any]]:
-    # Findings are part of the result here, so they are not noted on stderr as well.
-    runs = open_runs(settings.runs, Terminal(quiet=True), repair=settings.repair, axis=settings.axis)
-    if settings.strict:
-        hold_strict([(run.name, run.findings) for run in runs])
-    with terminal.work("looking into the runs"):
-        return runs, inspection_json(runs)
-
-
-def _print(run: dict[str, Any], terminal: Terminal) -> None:
+def _print_run(run: dict[str, Any], terminal: Terminal) -> None:
     first = [finding for finding in run["findings"] if finding["code"] in FIRST_OF_ALL]
     for finding in first:
         terminal.say(f"{run['run']}: {finding['code'].replace('_', ' ')}: {finding['message']}")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fogml.cli.lab import AcceptanceSettings, BatchSettings
-from fogml.cli.lab_jobs import say_where, tell
+from fogml.cli.results import tell
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
@@ -25,9 +25,6 @@ def acceptance_and_write(settings: AcceptanceSettings, terminal: Terminal) -> bo
     values = write_report(
         settings, terminal, lambda: None if settings.model is None else load_model(settings.model)
     )
-    _print(values, terminal)
-    terminal.result(values)
-    say_where("acceptance", settings.out, terminal)
     return values["verdict"] in (ACCEPTED, NO_LIMITS)
 
 
@@ -37,7 +34,7 @@ def write_report(
     model_of: Callable[[], DriftModel | None],
     check: Callable[[Sequence[Run]], None] = lambda runs: None,
 ) -> dict[str, Any]:
-    """The report of the runs that are named, written where a folder is named.
+    """The report of the runs that are named, written where a folder is named, and printed.
 
     Parameters
     ----------
@@ -71,17 +68,13 @@ def write_report(
                 date=settings.date,
             )
 
-    def page(values: dict[str, Any]) -> str:
-        from fogml.report.acceptance_page import acceptance_page
-
-        return acceptance_page(values)
-
-    def sheets(values: dict[str, Any], path: Path) -> None:
+    def sheets(values: dict[str, Any], folder: Path) -> None:
         from fogml.report.spreadsheets import acceptance_spreadsheet
 
-        acceptance_spreadsheet(values, path)
+        acceptance_spreadsheet(values, folder / "acceptance.xlsx")
 
-    return tell("acceptance", make, page, settings, settings.out, terminal, sheets)
+    page = "fogml.report.acceptance_page:acceptance_page"
+    return tell("lab acceptance", settings, terminal, make, page, _print, sheets)
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
@@ -120,15 +113,12 @@ def batch_and_write(settings: BatchSettings, terminal: Terminal) -> bool:
 
         return batch_page(values, settings.title)
 
-    def sheets(values: dict[str, Any], path: Path) -> None:
+    def sheets(values: dict[str, Any], folder: Path) -> None:
         from fogml.report.spreadsheets import batch_spreadsheet
 
-        batch_spreadsheet(values, path)
+        batch_spreadsheet(values, folder / "batch.xlsx")
 
-    values = tell("batch", make, page, settings, settings.out, terminal, sheets)
-    _print_batch(values, terminal)
-    terminal.result(values)
-    say_where("batch", settings.out, terminal)
+    values = tell("lab batch", settings, terminal, make, page, _print_batch, sheets)
     return values["counts"][ACCEPTED] == len(values["units"])
 
 

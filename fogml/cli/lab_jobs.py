@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from fogml.cli.lab import WAYS, MisalignmentSettings, NorthSettings, RateSettings
+from fogml.cli.results import tell
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError, known_are
-from fogml.json_files import finite_json, write_json
 from fogml.lab.misalignment_input import read_measurements
 from fogml.lab.misalignment_json import misalignment_json
 from fogml.lab.north import Drift, Scheme, check_sense, horizontal_rate
@@ -20,7 +17,6 @@ from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows
-from fogml.outputs import whole_folder
 from fogml.report.words import duration
 
 
@@ -32,18 +28,10 @@ def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -
 
     def make() -> dict[str, Any]:
         with terminal.work(f"reading {file}"):
-            measured = read_measurements(file, settings.state_angles)
-            return finite_json(misalignment_json(measured, settings.cross_tilt))
+            return misalignment_json(read_measurements(file, settings.state_angles), settings.cross_tilt)
 
-    def page(values: dict[str, Any]) -> str:
-        from fogml.report import misalignment_page
-
-        return misalignment_page(values)
-
-    values = tell("misalignment", make, page, settings.in_full(), settings.out, terminal)
-    _print_misalignment(values, terminal)
-    terminal.result(values)
-    say_where("misalignment", settings.out, terminal)
+    page = "fogml.report:misalignment_page"
+    tell("lab misalignment", settings, terminal, make, page, _print_misalignment)
 
 
 def _print_misalignment(values: dict[str, Any], terminal: Terminal) -> None:
@@ -88,55 +76,12 @@ def _figures(value: float, error: float | None, ends: list[float] | None) -> lis
     return [f"{value:.{places}f}", "–" if error is None else f"{error:.2g}", *told]
 
 
-def tell(
-    name: str,
-    make: Callable[[], dict[str, Any]],
-    page: Callable[[dict[str, Any]], str],
-    settings: Settings,
-    out: str | None,
-    terminal: Terminal,
-    sheets: Callable[[dict[str, Any], Path], None] | None = None,
-) -> dict[str, Any]:
-    """Make the values and, where a folder is named, write ``name.json``, ``name.html`` and the settings.
-
-    `sheets` writes ``name.xlsx`` too.
-    """
-    if out is None:
-        return make()
-    with whole_folder(out) as folder:
-        values = make()
-        write_json(folder / f"{name}.json", values)
-        with terminal.work("drawing"):
-            (folder / f"{name}.html").write_text(page(values), encoding="utf-8")
-        if sheets is not None:
-            sheets(values, folder / f"{name}.xlsx")
-        settings.write_into(folder, f"lab {name}")
-    return values
-
-
-def say_where(name: str, out: str | None, terminal: Terminal) -> None:
-    """Say which page to open, where something was written."""
-    if out is not None:
-        terminal.say(f"Written to {out}: open {Path(out) / f'{name}.html'}")
-
-
 def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:
     """Read the tests on a rate table, write them where a folder is named, and print them."""
     if bool(settings.runs) == bool(settings.twin):
         raise InputError("give recorded runs, or --twin to test a twin; one of the two")
-
-    def make() -> dict[str, Any]:
-        return finite_json(_values(settings, terminal))
-
-    def page(values: dict[str, Any]) -> str:
-        from fogml.report.rate_page import rate_page
-
-        return rate_page(values)
-
-    values = tell("rate", make, page, settings.in_full(), settings.out, terminal)
-    _print_rate(values, terminal)
-    terminal.result(values)
-    say_where("rate", settings.out, terminal)
+    page = "fogml.report.rate_page:rate_page"
+    tell("lab rate", settings, terminal, lambda: _values(settings, terminal), page, _print_rate)
 
 
 def _values(settings: RateSettings, terminal: Terminal) -> dict[str, Any]:
@@ -177,17 +122,9 @@ def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:
     _check(settings)
 
     def make() -> dict[str, Any]:
-        return finite_json(_recorded(settings, terminal) if settings.positions else _simulated(settings))
+        return _recorded(settings, terminal) if settings.positions else _simulated(settings)
 
-    def page(values: dict[str, Any]) -> str:
-        from fogml.report import north_page
-
-        return north_page(values)
-
-    values = tell("north", make, page, settings.in_full(), settings.out, terminal)
-    _print_north(values, terminal)
-    terminal.result(values)
-    say_where("north", settings.out, terminal)
+    tell("lab north", settings, terminal, make, "fogml.report:north_page", _print_north)
 
 
 def _check(settings: NorthSettings) -> None:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fogml.cli.results import tell
 from fogml.cli.run_commands import NoiseSettings
 from fogml.cli.runs import check_named_once, open_run
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
-from fogml.json_files import finite_json, write_json
-from fogml.outputs import whole_folder
 from fogml.report.words import duration
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
@@ -25,37 +25,25 @@ def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
         from fogml.export.noise_parameters import check_target
 
         check_target(settings.to)
-    text = None
-    if settings.out is None:
-        values = _noise(settings, terminal)
-        text = _for_others(settings, values)
-    else:
-        with whole_folder(settings.out) as folder:
-            values = _noise(settings, terminal)
-            write_json(folder / "noise.json", values)
-            text = _for_others(settings, values)
-            if text is not None:
-                (folder / text[0]).write_text(text[1], encoding="utf-8")
-            with terminal.work("drawing"):
-                from fogml.report import noise_page
 
-                (folder / "noise.html").write_text(noise_page(values), encoding="utf-8")
-            settings.write_into(folder, "noise")
-    _print(values, terminal)
-    if text is not None:
-        terminal.say(f"{text[0]}:\n{text[1]}")
-    terminal.result(values)
-    if settings.out is not None:
-        terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'noise.html'}")
+    def beside(values: dict[str, Any], folder: Path) -> None:
+        for name, text in _for_others(settings, values):
+            (folder / name).write_text(text, encoding="utf-8")
+
+    def show(values: dict[str, Any], terminal: Terminal) -> None:
+        _print(values, terminal)
+        for name, text in _for_others(settings, values):
+            terminal.say(f"{name}:\n{text}")
+
+    make = partial(_noise, settings, terminal)
+    tell("noise", settings, terminal, make, "fogml.report:noise_page", show, beside)
 
 
-def _for_others(settings: NoiseSettings, values: dict[str, Any]) -> tuple[str, str] | None:
-    """File name and text for the program that is asked for."""
-    if settings.to is None:
-        return None
+def _for_others(settings: NoiseSettings, values: dict[str, Any]) -> list[tuple[str, str]]:
+    """File name and text for the program that is asked for, if any is."""
     from fogml.export.noise_parameters import noise_text
 
-    return noise_text(values, settings.to)
+    return [] if settings.to is None else [noise_text(values, settings.to)]
 
 
 def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
@@ -70,7 +58,7 @@ def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
         values = noise_report(runs, overlapping=settings.overlapping)
         if len(runs) == 1:
             values["floor"] = _floor(runs[0], values["taus_s"])
-        return finite_json(values)
+        return values
 
 
 def _floor(run: Run, taus_s: Sequence[float]) -> dict[str, Any] | None:
