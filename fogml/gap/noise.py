@@ -68,7 +68,7 @@ class NoisePoints:
         step = np.array([0.01, 0.5 * self.prior.deviations[1], 0.5 * self.prior.deviations[2]])
         covariance += np.diag(step**2 / 12.0)
         model = NoiseModel(*(float(x) for x in np.exp(mean)))
-        return NoiseFit(model, covariance, self.prior, float(self.log_posteriors.max()), len(self.noises))
+        return NoiseFit(model, covariance, self.prior)
 
 
 def prior_of(

@@ -75,17 +75,11 @@ class NoiseFit:
         Posterior covariance of log N, log B and log K, shape (3, 3); zero for one that is held.
     prior
         What was assumed.
-    log_posterior
-        Greatest logarithm of the posterior density, up to a constant of the data.
-    evaluations
-        Of the likelihood.
     """
 
     model: NoiseModel
     covariance: FloatArray
     prior: NoisePrior
-    log_posterior: float
-    evaluations: int
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -162,17 +156,15 @@ def fit_noise(
     # Curvature below the prior's, of a likelihood that bends the other way, is no knowledge.
     values, vectors = np.linalg.eigh(curvature)
     mean, inverse = found.x, (vectors / np.maximum(values, 1.0)) @ vectors.T
-    evaluations = int(found.nfev)
     for _ in range(_ROUNDS):
         mean, inverse, matter = _moments(objective, mean, inverse, float(found.fun))
-        evaluations += _POINTS
         if matter >= _ENOUGH:
             break
     covariance = np.zeros((3, 3))
     covariance[np.ix_(free, free)] = inverse * np.outer(spread, spread)
     factors = np.ones(3)
     factors[free] = np.exp(mean * spread)
-    return NoiseFit(_scaled(prior.centre, factors), covariance, prior, -float(found.fun), evaluations)
+    return NoiseFit(_scaled(prior.centre, factors), covariance, prior)
 
 
 def _scaled(model: NoiseModel, factors: FloatArray) -> NoiseModel:

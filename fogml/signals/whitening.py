@@ -8,7 +8,6 @@ serve any number of columns.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from copy import copy
 
 import numpy as np
@@ -139,32 +138,6 @@ class Whitener:
         adjoint_kernel(columns, self._kind, self._decay, self._reading, self._gains, self.deviation, costates)
         return out
 
-    def whiten_blocks(self, blocks: Iterable[ArrayLike]) -> Iterator[FloatArray]:
-        """Whitened blocks of rows (r, k), in time order, one at a time: for columns that fill the memory.
-
-        Raises
-        ------
-        InputError
-            If blocks have more or fewer rows together than there are samples, or other columns.
-        """
-        states: FloatArray | None = None
-        row = 0
-        for given in blocks:
-            block = np.array(given, dtype=np.float64, order="C", ndmin=1)
-            columns = block if block.ndim == 2 else block[:, None]
-            if states is None:
-                states = np.zeros((self._gains.shape[1], columns.shape[1]))
-            if row + len(block) > len(self) or columns.shape[1] != states.shape[1]:
-                raise InputError(
-                    f"whitening: a block of {columns.shape[0]} rows and {columns.shape[1]} columns from row "
-                    f"{row} on; {len(self)} rows of {states.shape[1]} columns were expected"
-                )
-            self._work(columns, row, states, inverse=False)
-            row += len(block)
-            yield block
-        if row != len(self):
-            raise InputError(f"whitening: blocks of {row} rows together, {len(self)} were expected")
-
     def _copied(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """A copy to work in, its columns, and states at rest for them."""
         if values.ndim not in (1, 2) or len(values) != len(self):
@@ -176,18 +149,13 @@ class Whitener:
         return out, columns, np.zeros((self._gains.shape[1], columns.shape[1]))
 
     def _through(self, values: FloatArray, *, inverse: bool) -> FloatArray:
+        """A copy, worked in pieces that fit the cache."""
         out, columns, states = self._copied(values)
-        self._work(columns, 0, states, inverse=inverse)
-        return out
-
-    def _work(self, columns: FloatArray, first: int, states: FloatArray, *, inverse: bool) -> None:
-        """One block in place, pieces that fit the cache at a time."""
         rows = max(_BLOCK // max(columns.shape[1], 1), 1)
         for low in range(0, len(columns), rows):
-            high = min(low + rows, len(columns))
-            here = slice(first + low, first + high)
+            here = slice(low, min(low + rows, len(columns)))
             whiten_kernel(
-                columns[low:high],
+                columns[here],
                 self._kind[here],
                 self._decay,
                 self._reading,
@@ -197,11 +165,12 @@ class Whitener:
                 inverse,
             )
             # What is not finite stays in the states, if there are any.
-            if not np.all(np.isfinite(states if len(states) else columns[low:high])):
+            if not np.all(np.isfinite(states if len(states) else columns[here])):
                 raise InputError(
                     f"whitening: a value among rows {here.start} to {here.stop - 1} is not finite; "
                     "leave such rows out, the times then hold a gap"
                 )
+        return out
 
 
 def _checked_averaging(time: FloatArray, averaging_s: ArrayLike | None) -> FloatArray:

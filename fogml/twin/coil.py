@@ -1,4 +1,4 @@
-"""Thermally induced non-reciprocity of a wound coil: Shupe's integral, windings, layers of fibre.
+"""Thermally induced non-reciprocity of a wound coil by Shupe's integral: windings, layers of fibre.
 
 Light that goes round both ways meets a piece of fibre at different times. Where that piece warms
 at a rate ``Tdot(z)``, the difference reads as a rate of turn
@@ -21,7 +21,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError, known_are
@@ -31,29 +30,6 @@ from fogml.twin.plant.network import PlantState, ThermalNetwork
 _PER_MINUTE = 1.0 / 60.0
 # Which half of the fibre each layer belongs to, from the innermost outwards, over and over.
 _HALVES = {"dipole": "AB", "quadrupole": "ABBA", "octupole": "ABBABAAB"}
-
-
-def shupe_integral(position: ArrayLike, rate: ArrayLike, coil: Coil = REFERENCE_COIL) -> float:
-    """The rate error [deg/h] of a distribution of temperature rates along the fibre.
-
-    Parameters
-    ----------
-    position
-        Distance z along the fibre [m], increasing from 0 to its length, shape (n,).
-    rate
-        Rate of temperature there [degC/min], linear in between, shape (n,).
-    coil
-        The coil; its length is the last position's.
-    """
-    z = np.asarray(position, dtype=np.float64)
-    slope = np.asarray(rate, dtype=np.float64) * _PER_MINUTE
-    length = float(z[-1] - z[0])
-    lever = 2.0 * (z - z[0]) - length
-    # Exact for rates and levers linear between the positions (Simpson's rule on each piece).
-    middle = 0.25 * (lever[1:] + lever[:-1]) * (slope[1:] + slope[:-1])
-    pieces = (lever[1:] * slope[1:] + lever[:-1] * slope[:-1] + 4.0 * middle) / 6.0
-    factor = coil.index * coil.phase_slope / (length * coil.diameter)
-    return float(factor * np.sum(pieces * np.diff(z)) / DEG_H)
 
 
 def midpoint_sensitivity(coil: Coil = REFERENCE_COIL) -> float:

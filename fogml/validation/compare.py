@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from fogml.errors import FogmlError, InputError
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S
-from fogml.validation.judge import judge, judgement_of
+from fogml.validation.judge import judgement_of
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import check_turn_on_band, repeatability_of
 from fogml.validation.results import Judgement
@@ -19,57 +19,6 @@ if TYPE_CHECKING:
     from fogml.models.base import DriftModel
 
 Split = tuple[list[Run], list[Run]]
-
-
-def leave_one_run_out(
-    make: Callable[[], DriftModel],
-    runs: Sequence[Run],
-    *,
-    averaging_s: float = AVERAGING_S,
-    design_index: float | None = None,
-    limits: Mapping[str, float] | None = None,
-    turn_on_band: float | None = None,
-    any_unit: bool = False,
-) -> Judgement:
-    """Judge a kind of model on every run, each time fitted on the others.
-
-    Parameters
-    ----------
-    make
-        Makes the unfitted model.
-    runs
-        At least two.
-    averaging_s, design_index, limits, turn_on_band, any_unit
-        As in :func:`~fogml.validation.judge.judge`.
-
-    Returns
-    -------
-    Judgement
-        ``test`` holds each run as judged by a model that never saw it; ``model`` and ``train``
-        are of the model fitted on all of them.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two runs.
-    """
-    limits = check_limits(limits or {})
-    check_design_index(design_index)
-    folds = [
-        judge(
-            make().fit(others),
-            others,
-            held_out,
-            averaging_s=averaging_s,
-            turn_on_band=turn_on_band,
-            any_unit=any_unit,
-        )
-        for others, held_out in splits_of(runs)
-    ]
-    model = make().fit(runs)
-    errors = [run_errors(model, run, any_unit=True) for run in runs]
-    whole = judgement_of(model, errors, [], averaging_s=averaging_s, turn_on_band=turn_on_band)
-    return merged_folds(whole, folds, design_index, limits)
 
 
 def splits_of(runs: Sequence[Run]) -> list[Split]:

@@ -11,7 +11,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.models.names import make_model
 from fogml.runs.run import Run
-from fogml.validation.compare import compare, leave_one_run_out
+from fogml.validation.compare import compare
 from fogml.validation.floors import floor_interval
 from fogml.validation.index_search import Candidate, candidates, train_until_index
 from fogml.validation.judge import judge
@@ -62,7 +62,7 @@ def test_all_are_judged_on_the_same_rows(runs):
 def test_leaving_one_out_of_several_models_is_each_alone(runs):
     together = compare(makers("mean", "M1"), runs, None, limits={"rms": 5.0})
     for name, judgement in together.judgements.items():
-        alone = leave_one_run_out(makers(name)[name], runs, limits={"rms": 5.0})
+        alone = compare(makers(name), runs, None, limits={"rms": 5.0}).judgements[name]
         assert [run.after for run in judgement.test] == [run.after for run in alone.test]
         assert judgement.limits == alone.limits
         assert judgement.notes == alone.notes
@@ -108,7 +108,7 @@ def test_leave_one_out_never_trains_on_the_run_it_judges(runs):
             seen.append([run.name for run in runs])
             return super().fit(runs)
 
-    result = leave_one_run_out(Recording, runs)
+    result = compare({"one": Recording}, runs, None).judgements["one"]
     assert seen[:3] == [["b.csv", "c.csv"], ["a.csv", "c.csv"], ["a.csv", "b.csv"]]
     assert seen[3] == ["a.csv", "b.csv", "c.csv"]
     assert [run.run for run in result.test] == ["a.csv", "b.csv", "c.csv"]
@@ -116,7 +116,8 @@ def test_leave_one_out_never_trains_on_the_run_it_judges(runs):
 
 
 def test_leave_one_out_judges_by_hand(runs):
-    result = leave_one_run_out(partial(make_model, "M1"), runs, design_index=1.0, limits={"range": 1e-9})
+    found = compare(makers("M1"), runs, None, design_index=1.0, limits={"range": 1e-9})
+    result = found.judgements["M1"]
     by_hand = judge(make_model("M1").fit(runs[:2]), runs[:2], runs[2])
     assert result.test[2].after == by_hand.test[0].after
     assert result.design_index is not None
@@ -126,7 +127,7 @@ def test_leave_one_out_judges_by_hand(runs):
 
 def test_leave_one_out_needs_two(runs):
     with pytest.raises(InputError, match="at least two"):
-        leave_one_run_out(partial(make_model, "M1"), runs[:1])
+        compare(makers("M1"), runs[:1], None)
 
 
 def test_candidates_go_from_small_to_large():

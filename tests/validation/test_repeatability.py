@@ -12,7 +12,7 @@ from fogml.errors import InputError
 from fogml.report import spreadsheet, train_page
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-from fogml.validation.compare import leave_one_run_out
+from fogml.validation.compare import compare
 from fogml.validation.judge import judge
 from fogml.validation.report_json import judgement_json
 from tests.validation.known_drift import KnownDrift
@@ -91,5 +91,5 @@ def test_a_limit_needs_enough_runs(model):
 
 
 def test_left_out_runs_count_too():
-    found = leave_one_run_out(lambda: KnownDrift(), cycles()).repeatability
+    found = compare({"one": KnownDrift}, cycles(), None).judgements["one"].repeatability
     assert found is not None and found.runs == 6
