@@ -42,11 +42,8 @@ _WORD = re.compile(r"[a-z]{2,}(_[a-z]{2,})*\Z")
 def check_declaration(effect: Effect) -> None:
     """Names, texts and needs are stated and whole."""
     name = type(effect).__name__
-    for attribute in ("id", "code", "title", "stage", "amplitude"):
+    for attribute in ("code", "title", "stage", "amplitude"):
         assert hasattr(effect, attribute), f"{name} does not state '{attribute}'"
-    assert name == registry.class_name(effect.id), (
-        f"the class of '{effect.id}' is to be called {registry.class_name(effect.id)}, not {name}"
-    )
     assert effect.title.strip() and effect.code.strip(), f"{name}: title or letter code is empty"
     assert effect.stage in STAGES, f"{name}: stage '{effect.stage}' is none of {', '.join(STAGES)}"
     text = type(effect).__doc__ or ""

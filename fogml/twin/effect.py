@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -41,7 +42,8 @@ class Effect(ABC):
     Attributes
     ----------
     id, code, title
-        Name that configurations and reports use; letter code; a few words.
+        Name that configurations and reports use, that of the class, ``sensor_lag`` of ``SensorLag``, unless
+        it is stated; letter code; a few words.
     stage
         Where in the chain it acts.
     amplitude
@@ -101,6 +103,11 @@ class Effect(ABC):
     seeded: ClassVar[bool] = False
     family: ClassVar[str] = "signature"
     place: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "id" not in vars(cls):
+            cls.id = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
 
     @abstractmethod
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:

@@ -1,6 +1,6 @@
 """The catalogue's index: built-in effects, those of outside packages, and any registered by hand.
 
-A module of ``fogml.twin.effects`` holds the effects of one subject, each a class that is named as its id, in
+A module of ``fogml.twin.effects`` holds the effects of one subject, each a class whose name is its id, in
 CamelCase; they are found by being there. Another package adds its effects by the entry point group
 ``fogml.effects``, each naming a class or an object.
 """
@@ -89,11 +89,6 @@ def unregister(id: str) -> Effect:
     return found
 
 
-def class_name(id: str) -> str:
-    """The name of the class of an effect, e.g. ``shupe_pure`` to ``ShupePure``."""
-    return "".join(part.capitalize() for part in id.split("_"))
-
-
 def _discover() -> None:
     global _discovered
     if _discovered:
@@ -130,7 +125,7 @@ def _add(declared: Any, origin: str) -> None:
         declared = declared()
     if not isinstance(declared, Effect):
         raise InputError(f"{origin}: {declared!r} is no effect; a class derived from Effect is needed")
-    for name in ("id", "code", "title", "stage", "amplitude"):
+    for name in ("code", "title", "stage", "amplitude"):
         if not hasattr(declared, name):
             raise InputError(f"{origin}: class {type(declared).__name__} does not state '{name}'")
     if not _ID.match(declared.id):

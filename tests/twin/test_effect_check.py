@@ -84,7 +84,6 @@ DECLARATIONS = {
     "no sources": ({"sources": ()}, "states no sources"),
     "shows nothing": ({"shows": " "}, "where it shows"),
     "unknown scene": ({"shown_on": "the moon"}, "which is no scene"),
-    "class name": ({"name": "Another"}, "is to be called Sample"),
     "own relative": ({"confused_with": {"sample": "itself"}}, "confused_with 'sample'"),
     "own conflict": ({"conflicts": ("sample",)}, "conflicts with itself"),
     "unknown need": ({"needs": ("T", "moon")}, "moon"),

@@ -26,7 +26,6 @@ class ThermalNetwork(ThermalEffect):
     Source: heat equation (derived); ranges are engineering ones.
     """
 
-    id = "thermal_network"
     code = "A1"
     title = "Time constants of the thermal network"
     amplitude = signed("1", (0.05, 0.5), (0.05, 0.5), "A", 0.9)
@@ -59,7 +58,6 @@ class SelfHeating(ThermalEffect):
     Source: heat equation (derived); ranges are engineering ones.
     """
 
-    id = "self_heating"
     code = "A2"
     title = "Self-heating of the electronics"
     amplitude = unsigned("degC", (5.0, 20.0), (5.0, 20.0), "steady rise", 100.0)
@@ -97,7 +95,6 @@ class ChamberRipple(ThermalEffect):
     Source: two-term control of a chamber; form and ranges are engineering ones.
     """
 
-    id = "chamber_ripple"
     code = "A3"
     title = "Ripple of the chamber"
     amplitude = unsigned("degC", (0.1, 1.0), (0.1, 1.0), "a", 20.0)
@@ -141,7 +138,6 @@ class Airflow(ThermalEffect):
     Source: convection (literature); ranges are engineering ones.
     """
 
-    id = "airflow"
     code = "A4"
     title = "Airflow about the unit"
     amplitude = unsigned("1", (0.2, 2.0), (0.2, 2.0), "k", 100.0)
@@ -171,7 +167,6 @@ class HiddenThermalNode(ThermalEffect):
     Source: heat equation (derived); a lag of 20 to 60 min is an engineering range.
     """
 
-    id = "hidden_thermal_node"
     code = "A5"
     family = "hidden_node"
     place = "chamber"
@@ -208,7 +203,6 @@ class ChamberSetpointVsAir(ThermalEffect):
     Source: chamber practice; 1 to 3 degC is an engineering range.
     """
 
-    id = "chamber_setpoint_vs_air"
     code = "G13"
     title = "Set point of the chamber against its air"
     amplitude = Quantity(

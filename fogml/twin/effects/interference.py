@@ -29,7 +29,6 @@ class ElectronicCrosstalk(BiasEffect):
     over 50 degC, are engineering ones.
     """
 
-    id = "electronic_crosstalk"
     code = "C4"
     place = "electronics"
     title = "Electronic cross-talk"
@@ -69,7 +68,6 @@ class SupplyRipple(BiasEffect):
     Source: aliasing of a line (derived); Lefevre (literature); ranges are engineering ones.
     """
 
-    id = "supply_ripple"
     code = "C8"
     family = "supply"
     place = "electronics"
@@ -113,7 +111,6 @@ class ChamberPickup(BiasEffect):
     Source: interference synchronous with the duty cycle; form and ranges are engineering ones.
     """
 
-    id = "chamber_pickup"
     code = "F4"
     family = "machines"
     place = "chamber"
@@ -155,7 +152,6 @@ class CableAndSlipRing(BiasEffect):
     sensitivity.
     """
 
-    id = "cable_and_slip_ring"
     code = "F5"
     title = "Cable and slip ring"
     amplitude = signed("deg/h", (0.01, 1.0), (1e-4, 2e-2), "A", 1e4)
@@ -190,7 +186,6 @@ class Acoustic(BiasEffect):
     Source: aliasing of a line (derived); ranges are engineering ones.
     """
 
-    id = "acoustic"
     code = "F3"
     title = "Sound in the chamber"
     amplitude = unsigned("deg/h", (1e-3, 0.1), (1e-4, 5e-3), "a", 1e5)
@@ -225,7 +220,6 @@ class VibrationRectification(BiasEffect):
     Source: second-order response (literature); ranges are engineering ones.
     """
 
-    id = "vibration_rectification"
     code = "F1"
     family = "vibration"
     place = "mount"
@@ -259,7 +253,6 @@ class VibrationNoise(WhiteNoiseEffect):
     noise doubles at some g rms.
     """
 
-    id = "vibration_noise"
     code = "E11"
     title = "Noise under vibration"
     amplitude = unsigned("deg/sqrt(h)/g", (2e-3, 5e-2), (1e-4, 2e-3), "A", 1e6)

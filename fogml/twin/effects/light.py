@@ -31,7 +31,6 @@ class LightPower(BiasEffect):
     0.5 to 3 dB over temperature are engineering ranges.
     """
 
-    id = "light_power"
     code = "C14"
     title = "Light over temperature"
     amplitude = signed("deg/h", (0.05, 1.0), (1e-3, 1e-2), "e_0", 1e3)
@@ -71,7 +70,6 @@ class ArwPhysics(WhiteNoiseEffect):
     Source: Lefevre (literature); numbers derived; ranges are engineering ones.
     """
 
-    id = "arw_physics"
     code = "E8"
     title = "Angle random walk from photon noise"
     amplitude = unsigned("1", (1.0, 3.0), (1.0, 1.5), "over photon noise", 1e4)
@@ -117,7 +115,6 @@ class Radiation(ScaleFactorEffect):
     induced absorption over the dose; annealing of first order and ranges are engineering ones.
     """
 
-    id = "radiation"
     code = "C11"
     title = "Ionising radiation"
     amplitude = signed("ppm", (1.0, 30.0), (0.1, 3.0), "c", 1e5)
@@ -163,7 +160,6 @@ class RadiationNoise(WhiteNoiseEffect):
     Source: shot noise (derived); absorption as in ``radiation``; ranges are engineering ones.
     """
 
-    id = "radiation_noise"
     code = "E10"
     title = "Noise under ionising radiation"
     amplitude = unsigned("deg/sqrt(h)", (2e-3, 5e-2), (1e-4, 2e-3), "A", 1e6)

@@ -24,7 +24,6 @@ class LoggerSkew(LoggerEffect):
     Source: derived; skews of 0.1 to 60 s are an engineering range.
     """
 
-    id = "logger_skew"
     code = "G10"
     family = "clock_skew"
     place = "logger"
@@ -79,7 +78,6 @@ class Averaging(LoggerEffect):
     Source: derived; 1 to 100 s is an engineering range.
     """
 
-    id = "averaging"
     code = "G11"
     title = "Averaging by the logger"
     amplitude = unsigned("s", (1.0, 100.0), (1.0, 100.0), "W", 1e5)
@@ -124,7 +122,6 @@ class UnitsAndGaps(LoggerEffect):
     Source: derived.
     """
 
-    id = "units_and_gaps"
     code = "G12"
     title = "Wrong unit or sign"
     amplitude = signed("1", (0.99, 2.0), (0.99, 2.0), "A", 1e5, default=-2.0)
@@ -163,7 +160,6 @@ class OutputCounts(LoggerEffect):
     Source: derived; IEEE Std 952, annex C (literature), for its noise; ranges are engineering ones.
     """
 
-    id = "output_counts"
     code = "E12"
     title = "Output in counts"
     amplitude = unsigned("arcsec", (0.01, 1.0), (1e-3, 0.1), "q, one count", 1e6)
@@ -211,7 +207,6 @@ class OutliersDropouts(NoiseEffect):
     Source: logger practice; a probability of 1e-6 to 1e-4 is an engineering range.
     """
 
-    id = "outliers_dropouts"
     code = "E9"
     title = "Outliers and dropouts"
     amplitude = unsigned("deg/h", (10.0, 1000.0), (1.0, 100.0), "standard deviation of their size", 1e9)

@@ -28,7 +28,6 @@ class LoopGain(LoopEffect):
     temperature are engineering ranges.
     """
 
-    id = "loop_gain"
     code = "D4"
     title = "Gain of the closed loop"
     amplitude = unsigned("s", (1e-4, 1.6e-3), (3e-5, 4e-4), "time constant at 25 degC", 1e3)
@@ -84,7 +83,6 @@ class Deadband(LoopEffect):
     0.001 deg/h; ranges are engineering ones.
     """
 
-    id = "deadband"
     code = "D6"
     place = "electronics"
     title = "Dead zone about zero rate"
@@ -130,7 +128,6 @@ class FringeJump(LoopEffect):
     Source: closed loop's operating points, Lefevre (literature); offset derived.
     """
 
-    id = "fringe_jump"
     code = "D9"
     title = "Fringe jump"
     amplitude = signed("1", (1.0, 10.0), (1.0, 3.0), "m, fringes", 1e4, whole=True)
@@ -171,7 +168,6 @@ class RateRange(ReadoutEffect):
     Source: half a fringe derived, Lefevre (literature); ranges are engineering ones.
     """
 
-    id = "rate_range"
     code = "D11"
     title = "Range and saturation"
     amplitude = unsigned("1", (0.9, 1.0), (0.9, 1.0), "A, lost beyond", 1.0, default=1.0)
@@ -208,7 +204,6 @@ class SlewLimit(LoopEffect):
     Source: linear control with a limit (derived); ranges are engineering ones.
     """
 
-    id = "slew_limit"
     code = "D12"
     title = "Slew of the closed loop"
     amplitude = unsigned("1", (0.9, 1.0), (0.9, 1.0), "A", 1.0, default=1.0)

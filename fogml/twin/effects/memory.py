@@ -27,7 +27,6 @@ class ThermalHysteresis(BiasEffect):
     (tactical) and 0.002 to 0.05 deg/h (navigation) over 100 degC, are engineering ones.
     """
 
-    id = "thermal_hysteresis"
     code = "B8"
     family = "loops"
     place = "coil"
@@ -66,7 +65,6 @@ class StressRelaxation(BiasEffect):
     every 10 degC, and sizes are engineering ones.
     """
 
-    id = "stress_relaxation"
     code = "B9"
     family = "relaxation"
     place = "coil"
@@ -116,7 +114,6 @@ class ThermalShock(BiasEffect):
     for the scale factor, Telemetry and Remote Control 46 (2025) (read).
     """
 
-    id = "thermal_shock"
     code = "B10"
     place = "coil"
     title = "Slips under thermal shock"
@@ -173,7 +170,6 @@ class SfHysteresis(ScaleFactorEffect):
     temperature of 835 ppm raw and 38 ppm after correction (read), taken as full loops.
     """
 
-    id = "sf_hysteresis"
     code = "D8"
     family = "scale_factor_loops"
     place = "coil"

@@ -24,7 +24,6 @@ class Quantisation(NoiseEffect):
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
 
-    id = "quantisation"
     code = "E1"
     title = "Quantisation"
     amplitude = amplitude_of("Q")
@@ -57,7 +56,6 @@ class AngleRandomWalk(WhiteNoiseEffect):
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
 
-    id = "angle_random_walk"
     code = "E2"
     title = "Angle random walk"
     amplitude = amplitude_of("N")
@@ -85,7 +83,6 @@ class BiasInstability(NoiseEffect):
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
 
-    id = "bias_instability"
     code = "E3"
     title = "Bias instability"
     amplitude = amplitude_of("B")
@@ -119,7 +116,6 @@ class RateRandomWalk(NoiseEffect):
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
 
-    id = "rate_random_walk"
     code = "E4"
     title = "Rate random walk"
     amplitude = amplitude_of("K")
@@ -157,7 +153,6 @@ class RateRamp(NoiseEffect):
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
 
-    id = "rate_ramp"
     code = "E5"
     place = "electronics"
     title = "Rate ramp"
@@ -197,7 +192,6 @@ class Sinusoidal(NoiseEffect):
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
 
-    id = "sinusoidal"
     code = "E6"
     family = "line"
     place = "electronics"
@@ -237,7 +231,6 @@ class GaussMarkov(NoiseEffect):
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
 
-    id = "gauss_markov"
     code = "E7"
     title = "Gauss-Markov noise"
     amplitude = unsigned("deg/h", (0.05, 2.0), (5e-4, 1e-2), "standard deviation", 1e6)

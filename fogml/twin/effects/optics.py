@@ -26,7 +26,6 @@ class PolarizationNonreciprocity(BiasEffect):
     Technology 33 (2015) 2839; Lefevre (literature). Period derived; ranges are engineering ones.
     """
 
-    id = "polarization_nonreciprocity"
     code = "C2"
     family = "wave"
     place = "optics"
@@ -68,7 +67,6 @@ class PolarizationTwoPeriods(BiasEffect):
     (2015) 2839; Lefevre (literature). Sum over splices derived; ranges are engineering ones.
     """
 
-    id = "polarization_two_periods"
     code = "C15"
     title = "Polarisation non-reciprocity, two periods"
     amplitude = signed("deg/h", (0.02, 0.5), (5e-4, 1e-2), "A", 1e3)
@@ -116,7 +114,6 @@ class IntensityModulation(BiasEffect):
     for square-wave bias modulation derived.
     """
 
-    id = "intensity_modulation"
     code = "C5"
     title = "Spurious intensity modulation"
     amplitude = signed("urad", (0.1, 1.0), (5e-3, 0.05), "m", 1e3)
@@ -154,7 +151,6 @@ class Kerr(BiasEffect):
     broadband source (engineering).
     """
 
-    id = "kerr"
     code = "C6"
     title = "Kerr effect"
     amplitude = signed("deg/h", (1e-5, 1e-3), (1e-6, 1e-4), "A", 100.0)
@@ -188,7 +184,6 @@ class ProperFrequencyMismatch(BiasEffect):
     is an engineering range.
     """
 
-    id = "proper_frequency_mismatch"
     code = "C7"
     title = "Modulation off the proper frequency"
     amplitude = signed("deg/h", (100.0, 1000.0), (10.0, 100.0), "q", 1e6)

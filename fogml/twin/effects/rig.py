@@ -29,7 +29,6 @@ class EarthRate(RigEffect):
     Source: Earth rate, derived.
     """
 
-    id = "earth_rate"
     code = "G1"
     place = "mount"
     title = "Earth rate outside the reference"
@@ -74,7 +73,6 @@ class MountTilt(RigEffect):
     range.
     """
 
-    id = "mount_tilt"
     code = "G2"
     place = "mount"
     title = "Tilt of the mount over temperature"
@@ -111,7 +109,6 @@ class InputAxisMisalignment(RigEffect):
     ranges.
     """
 
-    id = "input_axis_misalignment"
     code = "G3"
     place = "mount"
     title = "Misalignment of the input axis"
@@ -158,7 +155,6 @@ class TableWobble(RigEffect):
     Source: geometry (derived); ranges are engineering ones.
     """
 
-    id = "table_wobble"
     code = "G4"
     title = "Wobble of the table"
     amplitude = unsigned("arcsec", (1.0, 60.0), (1.0, 10.0), "eps", 1e5)
@@ -192,7 +188,6 @@ class TableRateError(RigEffect):
     Source: rate table practice; ranges are engineering ones.
     """
 
-    id = "table_rate_error"
     code = "G5"
     place = "table"
     title = "Error of the table's rate"
@@ -229,7 +224,6 @@ class TableJitter(RigEffect):
     Source: aliasing of a line (derived); ranges are engineering ones.
     """
 
-    id = "table_jitter"
     code = "F2"
     title = "Jitter of the table"
     amplitude = unsigned("deg/h", (0.01, 10.0), (1e-3, 1.0), "a", 1e6)

@@ -25,7 +25,6 @@ class SourceWavelength(ScaleFactorEffect):
     Source: US8254416, US7269190 (literature); Lefevre (literature); ranges partly engineering ones.
     """
 
-    id = "source_wavelength"
     code = "D1"
     family = "scale_factor_node"
     place = "optics"
@@ -59,7 +58,6 @@ class CoilExpansion(ScaleFactorEffect):
     Source: Lefevre (literature); ranges partly engineering ones.
     """
 
-    id = "coil_expansion"
     code = "D2"
     place = "coil"
     title = "Expansion of the coil"
@@ -92,7 +90,6 @@ class HalfwaveVoltage(ScaleFactorEffect):
     Source: Lefevre (literature); ranges of 0.3 to 30 ppm/degC are engineering ones, split between grades.
     """
 
-    id = "halfwave_voltage"
     code = "D3"
     family = "modulator"
     place = "optics"
@@ -128,7 +125,6 @@ class SfNonlinearity(ScaleFactorEffect):
     Source: Lefevre (literature); ranges are engineering ones.
     """
 
-    id = "sf_nonlinearity"
     code = "D5"
     family = "odd_in_rate"
     place = "electronics"
@@ -172,7 +168,6 @@ class SfAsymmetry(ScaleFactorEffect):
     Source: IEEE Std 952 (literature); ranges are engineering ones.
     """
 
-    id = "sf_asymmetry"
     code = "D5"
     family = "even_in_rate"
     place = "electronics"
@@ -210,7 +205,6 @@ class TimeBase(ScaleFactorEffect):
     are engineering ones.
     """
 
-    id = "time_base"
     code = "D7"
     title = "Time base"
     amplitude = Quantity("amplitude", "ppm", (5.0, 50.0), (0.5, 5.0), "of the clock 50 degC off", (-1e4, 1e4))
@@ -253,7 +247,6 @@ class SfTemperature(ScaleFactorEffect):
     Source: IEEE Std 952-1997 (literature); ranges are engineering ones.
     """
 
-    id = "sf_temperature"
     code = "D10"
     title = "Temperature sensitivity of the scale factor"
     amplitude = signed("ppm/degC", (5.0, 100.0), (0.5, 5.0), "eps_T", 1e4)

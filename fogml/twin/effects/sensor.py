@@ -26,7 +26,6 @@ class SensorLag(SensorEffect):
     Source: first-order sensor (derived); ranges are engineering ones.
     """
 
-    id = "sensor_lag"
     code = "G6"
     family = "sensor_lag"
     place = "sensor"
@@ -69,7 +68,6 @@ class SensorOffset(SensorEffect):
     Source: data sheets of sensors (literature); ranges are engineering ones.
     """
 
-    id = "sensor_offset"
     code = "G7"
     title = "Offset of the temperature sensors"
     amplitude = signed("degC", (0.05, 0.5), (0.05, 0.5), "at 25 degC", 20.0)
@@ -110,7 +108,6 @@ class SensorQuantisation(SensorEffect):
     data sheets of sensors (literature).
     """
 
-    id = "sensor_quantisation"
     code = "G8"
     family = "sensor_steps"
     place = "sensor"
@@ -195,7 +192,6 @@ class SensorPlacement(SensorEffect):
     Source: mix of nodes (derived); ranges are engineering ones.
     """
 
-    id = "sensor_placement"
     code = "G9"
     family = "sensor_placement"
     place = "sensor"

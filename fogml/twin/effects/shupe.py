@@ -25,7 +25,6 @@ class ShupePure(BiasEffect):
     Form and size derived with a layer model; ranges are engineering ones.
     """
 
-    id = "shupe_pure"
     code = "B1"
     family = "gradient_rate"
     place = "coil"
@@ -65,7 +64,6 @@ class ShupeTrim(BiasEffect):
     for trimming; the coefficient is derived; ranges are engineering ones.
     """
 
-    id = "shupe_trim"
     code = "B2"
     title = "Mid-point error of the coil"
     amplitude = signed("m", (0.1, 2.0), (0.005, 0.1), "delta", 1e3)
@@ -99,7 +97,6 @@ class PigtailShupe(BiasEffect):
     ones, a navigation gyro's leads lying together but for some centimetres.
     """
 
-    id = "pigtail_shupe"
     code = "B6"
     family = "leads"
     place = "leads"
@@ -137,7 +134,6 @@ class AzimuthalGradient(BiasEffect):
     (engineering).
     """
 
-    id = "azimuthal_gradient"
     code = "B7"
     place = "coil"
     title = "Shupe effect of a side-on gradient"
@@ -175,7 +171,6 @@ class ShupeWinding(BiasEffect):
     A is an engineering one.
     """
 
-    id = "shupe_winding"
     code = "B12"
     title = "Shupe effect of the unit's winding"
     amplitude = signed("1", (0.5, 5.0), (0.5, 2.0), "A, over theory", 1e4)
@@ -220,7 +215,6 @@ class AxialGradient(BiasEffect):
     S_g of shupe_pure (engineering).
     """
 
-    id = "axial_gradient"
     code = "B13"
     title = "Shupe effect of an axial gradient"
     amplitude = signed("deg/h/(degC/min)", (0.02, 1.0), (1e-3, 0.05), "S_ax", 1e3)

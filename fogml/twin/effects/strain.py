@@ -24,7 +24,6 @@ class ShupeMohr(BiasEffect):
     (literature); ranges are engineering ones.
     """
 
-    id = "shupe_mohr"
     code = "B3"
     family = "rate"
     place = "coil"
@@ -68,7 +67,6 @@ class TemperatureRateProduct(BiasEffect):
     an input; ranges, S_x / S_m0 of 0.001 to 0.02 per degC, are engineering ones.
     """
 
-    id = "temperature_rate_product"
     code = "B4"
     family = "rate_product"
     place = "coil"
@@ -103,7 +101,6 @@ class GlassTransition(BiasEffect):
     -60 to -20 degC for silicone and acrylate, 40 to 90 degC for epoxy.
     """
 
-    id = "glass_transition"
     code = "B5"
     family = "transition"
     place = "coil"
@@ -156,7 +153,6 @@ class Moisture(BiasEffect):
     15 degC, about 0.1 deg/h; first-order uptake for Fick's law, and ranges, are engineering.
     """
 
-    id = "moisture"
     code = "B11"
     family = "moisture"
     place = "coil"

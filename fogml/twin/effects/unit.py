@@ -26,7 +26,6 @@ class BiasPolynomial(BiasEffect):
     of 0.5 to 10 deg/h (tactical) and 0.01 to 0.2 deg/h (navigation), are engineering ones.
     """
 
-    id = "bias_polynomial"
     code = "C1"
     family = "static"
     place = "coil"
@@ -68,7 +67,6 @@ class Magnetic(BiasEffect):
     (read); ranges partly literature, partly engineering.
     """
 
-    id = "magnetic"
     code = "C3"
     place = "coil and shield"
     title = "Magnetic sensitivity"
@@ -118,7 +116,6 @@ class GSensitivity(BiasEffect):
     Source: IEEE Std 952-1997 (literature); ranges are engineering ones, usually 0 in a fibre-optic gyro.
     """
 
-    id = "g_sensitivity"
     code = "C13"
     title = "Sensitivity to acceleration"
     amplitude = signed("deg/h/g", (1e-3, 2e-2), (2e-5, 1e-3), "g_1", 100.0)
@@ -156,7 +153,6 @@ class TurnOnBias(BiasEffect):
     engineering ones.
     """
 
-    id = "turn_on_bias"
     code = "C9"
     family = "power_cycles"
     place = "electronics"
@@ -195,7 +191,6 @@ class WarmupBias(BiasEffect):
     the patent on seeking north at start-up (read), is of that size.
     """
 
-    id = "warmup_bias"
     code = "C12"
     family = "warm_up"
     place = "electronics"
@@ -238,7 +233,6 @@ class Ageing(BiasEffect):
     0.02 deg/h (navigation) in the first year for tau = 100 h.
     """
 
-    id = "ageing"
     code = "C10"
     family = "ageing"
     place = "unit"
