@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from fogml.errors import InputError, quoted
+
+CONTENT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=())
+"""Of `Strict`; a dataclass that has it by `pydantic.with_config` is held to it where it is read."""
 
 
 class Strict(BaseModel):
@@ -15,17 +19,22 @@ class Strict(BaseModel):
     A whole number stands for a float too, as JSON does not tell them apart.
     """
 
-    model_config = ConfigDict(
-        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=()
-    )
+    model_config = CONTENT
 
 
 def first_fault(error: ValidationError) -> Any:
     """The fault to tell: an unknown key before what is missing, as it may be its name mistyped."""
-    return min(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
+    unknown = ("extra_forbidden", "unexpected_keyword_argument")
+    return min(error.errors(include_url=False), key=lambda fault: fault["type"] not in unknown)
 
 
-Content = TypeVar("Content", bound=Strict)
+Content = TypeVar("Content")
+
+
+def as_written(content: Any) -> dict[str, Any]:
+    """What a file holds of a dataclass or a `Strict`, JSON-ready; `strictly` reads it."""
+    found: dict[str, Any] = TypeAdapter(type(content)).dump_python(content, mode="json")
+    return found
 
 
 def strictly(kind: type[Content], values: Any, key: str = "") -> Content:
@@ -34,7 +43,7 @@ def strictly(kind: type[Content], values: Any, key: str = "") -> Content:
     Parameters
     ----------
     kind
-        What they should be.
+        What they should be: a `Strict`, or a dataclass with `CONTENT`.
     values
         What was read.
     key
@@ -46,7 +55,11 @@ def strictly(kind: type[Content], values: Any, key: str = "") -> Content:
         Naming the first key that is not as it should be, what it is, and what was expected.
     """
     try:
-        return kind.model_validate(values)
+        if issubclass(kind, BaseModel):
+            return kind.model_validate(values)
+        # As JSON, lists stand for tuples.
+        read: Content = TypeAdapter(kind).validate_json(json.dumps(values))
+        return read
     except ValidationError as error:
         first = first_fault(error)
         place = ".".join(str(part) for part in ((key,) if key else ()) + first["loc"]) or "content"

@@ -16,6 +16,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored, arrays_to_write
+from fogml.strict import as_written
 
 SCHEMA = "fogml.weights/1"
 JSON_FILE, TENSORS_FILE, MAT_FILE = "fogml_model.json", "fogml_model.safetensors", "fogml_model.mat"
@@ -183,7 +184,7 @@ def _slices(plan: Plan) -> dict[str, Any] | None:
     if slices is None:
         return None
     low, high = slices.bounds
-    return replace(slices, low=low, high=high).as_dict(plan.atoms)
+    return as_written(replace(slices, low=low, high=high).saved(plan.atoms))
 
 
 def _cells(words: Any) -> NDArray[np.object_]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,12 +16,12 @@ from fogml.features.blocks import evaluate_measured, heeded_rows
 from fogml.features.box import Box, reaching_box
 from fogml.features.grammar import parse_terms
 from fogml.features.signal import check_holds
-from fogml.features.slices import Slices
+from fogml.features.slices import SavedSlices, Slices
 from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
 from fogml.features.transformer import Transformer
 from fogml.runs.dropouts import RULE, DropoutRule
 from fogml.runs.run import Run
-from fogml.runs.thermometer_limits import limits_from_dict
+from fogml.runs.thermometer_limits import SavedLimits, rule_of
 
 if TYPE_CHECKING:
     from fogml.features.blocks import FeatureBlocks
@@ -179,10 +179,10 @@ class Features(Transformer):
     def set_box(
         self,
         box: Mapping[str, tuple[float, float]],
-        slices: Mapping[str, Any] | None = None,
-        thermometer: Mapping[str, float] | None = None,
+        slices: SavedSlices | None = None,
+        thermometer: SavedLimits | None = None,
     ) -> Self:
-        """Take over a box as `box` gives it, `Slices.as_dict` and `limits_as_dict`, as of a saved model.
+        """Take over a box as `box` gives it, slices and limits of thermometers, as of a saved model.
 
         Raises
         ------
@@ -194,8 +194,8 @@ class Features(Transformer):
             raise InputError(f"trained box: no bounds of {', '.join(missing)}")
         low, high = zip(*(box[atom.text] for atom in self._atoms))
         self._box = Box(np.array(low), np.array(high))
-        self._slices = None if slices is None else Slices.from_dict(slices, self._atoms)
-        self.thermometer = self.thermometer if thermometer is None else limits_from_dict(thermometer)
+        self._slices = None if slices is None else Slices.from_saved(slices, self._atoms)
+        self.thermometer = self.thermometer if thermometer is None else rule_of(thermometer)
         return self
 
     def _learned_box(self) -> Box:

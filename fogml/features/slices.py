@@ -8,9 +8,9 @@ which a microcontroller looks up at every sample.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,7 @@ from pydantic import Field
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.features.atoms import Atom
-from fogml.strict import Strict, strictly
+from fogml.strict import Strict
 
 SLICES = 32
 """Slices of the trained range of temperature: 3 degC of a range of 100 degC, some minutes of a ramp."""
@@ -135,29 +135,24 @@ class Slices:
         level = where[self.level]
         return replace(self, level=level, of=of, less=less, low=self.low[kept], high=self.high[kept])
 
-    def as_dict(self, atoms: Sequence[Atom]) -> dict[str, Any]:
-        """JSON-ready values, atoms by their texts."""
+    def saved(self, atoms: Sequence[Atom]) -> SavedSlices:
+        """What files hold of them, atoms by their texts."""
         names = [atom.text for atom in atoms]
-        return {
-            "of": names[self.level],
-            "first": self.first,
-            "width": self.width,
-            "inputs": [
-                {"atom": names[i], "less": None if j < 0 else names[j], "low": low, "high": high}
-                for i, j, low, high in zip(self.of, self.less, self.low.tolist(), self.high.tolist())
-            ],
-        }
+        inputs = [
+            SavedInput(atom=names[i], less=None if j < 0 else names[j], low=low, high=high)
+            for i, j, low, high in zip(self.of, self.less, self.low.tolist(), self.high.tolist())
+        ]
+        return SavedSlices(of=names[self.level], first=self.first, width=self.width, inputs=inputs)
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], atoms: Sequence[Atom]) -> Slices:
-        """The slices that `as_dict` wrote.
+    def from_saved(cls, saved: SavedSlices, atoms: Sequence[Atom]) -> Slices:
+        """The slices that `saved` gave.
 
         Raises
         ------
         InputError
             If they are none of these atoms.
         """
-        saved = strictly(SavedSlices, values, "slices")
         names = [atom.text for atom in atoms]
         wanted = [saved.of, *(name for i in saved.inputs for name in (i.atom, i.less) if name is not None)]
         unknown = [name for name in wanted if name not in names]
@@ -176,7 +171,9 @@ class Slices:
         )
 
 
-class _SavedInput(Strict):
+class SavedInput(Strict):
+    """Trained range of an atom, or of one less another, in each slice."""
+
     atom: str
     less: str | None
     low: list[float] = Field(min_length=1)
@@ -184,12 +181,12 @@ class _SavedInput(Strict):
 
 
 class SavedSlices(Strict):
-    """Slices as `Slices.as_dict` writes them."""
+    """Slices as files hold them."""
 
     of: str
     first: float
     width: Annotated[float, Field(gt=0.0)]
-    inputs: list[_SavedInput] = Field(min_length=1)
+    inputs: list[SavedInput] = Field(min_length=1)
 
 
 def _inputs_of(atoms: Sequence[Atom]) -> tuple[int | None, list[tuple[int, int]]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.features.box import Box
 from fogml.features.features import Features
 from fogml.features.operators import most_beyond
+from fogml.features.slices import SavedSlices
 from fogml.runs.run import Run
 
 
@@ -28,9 +28,9 @@ def learn_box(features: Features, atoms: Iterable[FloatArray]) -> None:
     features.set_box(spans, slices_of(features))
 
 
-def slices_of(features: Features) -> dict[str, Any] | None:
-    """The features' slices, JSON-ready; None if they have none."""
-    return None if features.slices is None else features.slices.as_dict(features.atoms)
+def slices_of(features: Features) -> SavedSlices | None:
+    """The features' slices as files hold them; None if they have none."""
+    return None if features.slices is None else features.slices.saved(features.atoms)
 
 
 def distance_outside(atoms: FloatArray, outside: BoolArray, features: Features) -> FloatArray:

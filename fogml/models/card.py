@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Annotated, Any, Literal
 
-from annotated_types import Len
-from pydantic import Field
+from pydantic import Field, with_config
 
 import fogml
 from fogml.errors import InputError
@@ -17,21 +16,23 @@ from fogml.features.features import Features
 from fogml.features.slices import SavedSlices
 from fogml.models.box import slices_of
 from fogml.runs.run import Run
-from fogml.runs.thermometer_limits import SavedLimits, limits_as_dict, trained_limits
-from fogml.strict import Strict, strictly
+from fogml.runs.thermometer_limits import SavedLimits, saved_limits, trained_limits
+from fogml.strict import CONTENT
 
 
+@with_config(CONTENT)
 @dataclass(frozen=True)
 class TrainingRun:
     """A training run by name and by the SHA-256 of its columns."""
 
     name: str
-    sha256: str
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
+@with_config(CONTENT)
 @dataclass(frozen=True)
 class TrainingCard:
-    """Where a model comes from.
+    """Where a model comes from, as saved models hold it.
 
     Attributes
     ----------
@@ -52,88 +53,23 @@ class TrainingCard:
     box
         Atom of the features to its [low, high] in the training rows, in the atom's unit.
     slices
-        Trained ranges at each temperature, as `fogml.features.slices.Slices.as_dict` gives them.
+        Trained ranges at each temperature.
     thermometer
-        Limits of what a thermometer can show, as `fogml.runs.thermometer_limits.limits_as_dict` gives them;
-        None for those of any thermometer.
+        Limits of what a thermometer can show; None for those of any thermometer.
     notes
         What a user of the model should know.
     """
 
     unit: str | None
     axis: str | None
-    gyro_unit: str
+    gyro_unit: Literal["deg/h", "count"]
     runs: tuple[TrainingRun, ...]
     fogml_version: str
-    sample_s: float
+    sample_s: Annotated[float, Field(gt=0.0)]
     earth_known: bool
-    rows: int
+    rows: Annotated[int, Field(ge=0)]
     box: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    slices: Mapping[str, Any] | None = None
-    thermometer: Mapping[str, float] | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """The card as JSON-ready values."""
-        return {
-            "unit": self.unit,
-            "axis": self.axis,
-            "gyro_unit": self.gyro_unit,
-            "runs": [{"name": run.name, "sha256": run.sha256} for run in self.runs],
-            "fogml_version": self.fogml_version,
-            "sample_s": self.sample_s,
-            "earth_known": self.earth_known,
-            "rows": self.rows,
-            "box": {name: [low, high] for name, (low, high) in self.box.items()},
-            "notes": list(self.notes),
-            "slices": None if self.slices is None else dict(self.slices),
-            "thermometer": None if self.thermometer is None else dict(self.thermometer),
-        }
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> TrainingCard:
-        """The card that `as_dict` wrote.
-
-        Raises
-        ------
-        InputError
-            If it is not such a card.
-        """
-        saved = strictly(_Saved, values, "card")
-        return cls(
-            unit=saved.unit,
-            axis=saved.axis,
-            gyro_unit=saved.gyro_unit,
-            runs=tuple(TrainingRun(run.name, run.sha256) for run in saved.runs),
-            fogml_version=saved.fogml_version,
-            sample_s=saved.sample_s,
-            earth_known=saved.earth_known,
-            rows=saved.rows,
-            box={name: (low, high) for name, (low, high) in saved.box.items()},
-            notes=tuple(saved.notes),
-            slices=None if saved.slices is None else saved.slices.model_dump(),
-            thermometer=None if saved.thermometer is None else saved.thermometer.model_dump(),
-        )
-
-
-class _SavedRun(Strict):
-    name: str
-    sha256: str = Field(pattern="^[0-9a-f]{64}$")
-
-
-class _Saved(Strict):
-    """A card as `TrainingCard.as_dict` writes it."""
-
-    unit: str | None
-    axis: str | None
-    gyro_unit: Literal["deg/h", "count"]
-    runs: list[_SavedRun]
-    fogml_version: str
-    sample_s: float = Field(gt=0.0)
-    earth_known: bool
-    rows: int = Field(ge=0)
-    box: dict[str, Annotated[list[float], Len(2, 2)]]
-    notes: list[str]
     slices: SavedSlices | None = None
     thermometer: SavedLimits | None = None
 
@@ -175,7 +111,7 @@ def training_card(
         box=dict(features.box) if features is not None else {},
         notes=tuple(notes),
         slices=slices_of(features) if features is not None else None,
-        thermometer=limits_as_dict(features.thermometer) if features is not None else None,
+        thermometer=saved_limits(features.thermometer) if features is not None else None,
     )
 
 

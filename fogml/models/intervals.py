@@ -16,13 +16,13 @@ distance: twice as wide at one tenth of the box's span.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field
+from pydantic import Field, with_config
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
@@ -30,13 +30,14 @@ from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s
 from fogml.signals.averages import AVERAGING_S
 from fogml.signals.distributions import normal_ppf, student_ppf
-from fogml.strict import Strict, strictly
+from fogml.strict import CONTENT, strictly
 
 LEVELS = (*(round(0.05 * i, 2) for i in range(1, 20)), 0.975, 0.99, 0.995)
 WIDENING_PER_SPAN = 10.0
 """Growth of the half-width per box span outside the box, as a share of itself, where nothing tells it."""
 
 
+@with_config(CONTENT)
 @dataclass(frozen=True)
 class Intervals:
     """Half-widths of the prediction interval at a grid of levels.
@@ -55,12 +56,12 @@ class Intervals:
         Growth of the half-width per box span outside the box, as a share of itself.
     """
 
-    averaging_s: float
-    half_widths: tuple[float, ...]
-    count: int
+    averaging_s: Annotated[float, Field(gt=0.0)]
+    half_widths: tuple[Annotated[float, Field(ge=0.0)], ...]
+    count: Annotated[int, Field(ge=1)]
     folds: str
-    levels: tuple[float, ...] = field(default=LEVELS)
-    widening_per_span: float = WIDENING_PER_SPAN
+    levels: Annotated[tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...], Field(min_length=1)] = LEVELS
+    widening_per_span: Annotated[float, Field(ge=0.0)] = WIDENING_PER_SPAN
 
     def half_width(self, level: float, excess: ArrayLike = 0.0) -> FloatArray:
         """Half-width [deg/h] at a level, for samples `excess` spans outside the box.
@@ -86,43 +87,19 @@ class Intervals:
             "folds": self.folds,
         }
 
-    def as_dict(self) -> dict[str, Any]:
-        """The intervals as JSON-ready values."""
-        return {
-            "averaging_s": self.averaging_s,
-            "levels": list(self.levels),
-            "half_widths": list(self.half_widths),
-            "count": self.count,
-            "folds": self.folds,
-            "widening_per_span": self.widening_per_span,
-        }
 
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Intervals:
-        """The intervals that `as_dict` wrote.
+def saved_intervals(values: Any) -> Intervals:
+    """Intervals that a saved model holds.
 
-        Raises
-        ------
-        InputError
-            If they are not such intervals.
-        """
-        saved = strictly(_Saved, values, "interval")
-        levels, half_widths = tuple(saved.levels), tuple(saved.half_widths)
-        if len(levels) != len(half_widths) or sorted(set(levels)) != list(levels):
-            raise InputError("key 'interval': levels and half_widths do not match")
-        widening = saved.widening_per_span
-        return cls(saved.averaging_s, half_widths, saved.count, saved.folds, levels, widening)
-
-
-class _Saved(Strict):
-    """Intervals as `Intervals.as_dict` writes them."""
-
-    averaging_s: float = Field(gt=0.0)
-    levels: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(min_length=1)
-    half_widths: list[Annotated[float, Field(ge=0.0)]]
-    count: int = Field(ge=1)
-    folds: str
-    widening_per_span: float = Field(default=WIDENING_PER_SPAN, ge=0.0)
+    Raises
+    ------
+    InputError
+        If they are none.
+    """
+    found = strictly(Intervals, values, "interval")
+    if len(found.levels) != len(found.half_widths) or sorted(set(found.levels)) != list(found.levels):
+        raise InputError("key 'interval': levels and half_widths do not match")
+    return found
 
 
 def intervals_from_residuals(residuals: ArrayLike, averaging_s: float, folds: str) -> Intervals:

@@ -32,11 +32,11 @@ from fogml.json_files import json_text
 from fogml.models.arrays import arrays_from_bytes, arrays_to_bytes
 from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
-from fogml.models.intervals import Intervals
+from fogml.models.intervals import saved_intervals
 from fogml.models.names import PRESETS
 from fogml.models.regressors import SKOPS, own_regressors
 from fogml.outputs import whole_folder
-from fogml.strict import Strict, strictly
+from fogml.strict import Strict, as_written, strictly
 from fogml.strict_json import content_hash, json_object, read_bytes, read_json
 
 SCHEMA = "fogml.model/2"
@@ -181,8 +181,8 @@ def model_to_saved(model: DriftModel) -> tuple[dict[str, Any], dict[str, NDArray
         "kind": model.kind,
         "form": model.form,
         "model": own,
-        "card": model.card_.as_dict(),
-        "interval": model.intervals_.as_dict(),
+        "card": as_written(model.card_),
+        "interval": as_written(model.intervals_),
     }
     return values, arrays
 
@@ -196,8 +196,8 @@ def model_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]) ->
         If the values are not those of a saved model.
     """
     model_class = model_of_form(values["form"], values["kind"])
-    card = TrainingCard.from_dict(values["card"])
-    intervals = Intervals.from_dict(values["interval"])
+    card = strictly(TrainingCard, values["card"], "card")
+    intervals = saved_intervals(values["interval"])
     model = model_class.from_saved({**values["model"], "kind": values["kind"]}, arrays, card)
     if model.kind != values["kind"]:
         raise InputError(f"key 'kind': {quoted(values['kind'])}, but the model is of kind '{model.kind}'")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.runs.columns import is_temperature
 from fogml.runs.dropouts import RULE, DropoutRule
 from fogml.runs.run import Run
-from fogml.strict import Strict, strictly
+from fogml.strict import Strict
 
 
 @dataclass(frozen=True)
@@ -46,22 +46,19 @@ LIMITS = LimitSettings()
 
 
 class SavedLimits(Strict):
-    """Limits as `limits_as_dict` writes them."""
+    """Limits that training sets, as files hold them."""
 
     jump_degC: float = Field(gt=0.0)
     rate_degC_s: float = Field(gt=0.0)
 
 
-def limits_as_dict(rule: DropoutRule) -> dict[str, float]:
-    """The limits that training sets, JSON-ready."""
-    return {"jump_degC": rule.jump_degC, "rate_degC_s": rule.rate_degC_s}
+def saved_limits(rule: DropoutRule) -> SavedLimits:
+    """The limits of a rule that training sets."""
+    return SavedLimits(jump_degC=rule.jump_degC, rate_degC_s=rule.rate_degC_s)
 
 
-def limits_from_dict(values: Mapping[str, float] | None) -> DropoutRule:
-    """The rule that `limits_as_dict` wrote; that of any thermometer for None."""
-    if values is None:
-        return RULE
-    saved = strictly(SavedLimits, dict(values), "thermometer")
+def rule_of(saved: SavedLimits) -> DropoutRule:
+    """The rule with such limits."""
     return DropoutRule(jump_degC=saved.jump_degC, rate_degC_s=saved.rate_degC_s, noise_sigma=0.0)
 
 

@@ -8,11 +8,12 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.features.features import Features
-from fogml.features.slices import Slices
+from fogml.features.slices import SavedSlices, Slices
 from fogml.models.box import distance_outside, learn_box, slices_of
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
 from fogml.runs.run import Run
+from fogml.strict import as_written, strictly
 
 
 def _run(*ends, name="run", rate=1.0, sample_s=4.0, **others):
@@ -85,13 +86,14 @@ def test_streaming_saving_and_c_tell_the_same(tmp_path):
 def test_slices_of_a_file_are_checked():
     features = Features("T, dT")
     learn_box(features, [np.column_stack([np.arange(40.0), np.arange(40.0) % 3])])
-    values = json.loads(json.dumps(slices_of(features)))
-    again = Slices.from_dict(values, features.atoms)
+    values = json.loads(json.dumps(as_written(slices_of(features))))
+    again = Slices.from_saved(strictly(SavedSlices, values), features.atoms)
     assert np.array_equal(again.low, features.slices.low)
     with pytest.raises(InputError, match="no atom 'dT_in'"):
-        Slices.from_dict(values | {"inputs": [values["inputs"][0] | {"atom": "dT_in"}]}, features.atoms)
+        wrong = values | {"inputs": [values["inputs"][0] | {"atom": "dT_in"}]}
+        Slices.from_saved(strictly(SavedSlices, wrong), features.atoms)
     with pytest.raises(InputError, match="width"):
-        Slices.from_dict(values | {"width": 0.0}, features.atoms)
+        strictly(SavedSlices, values | {"width": 0.0})
 
 
 def test_of_some_of_the_atoms_it_says_what_it_says_of_all():

@@ -7,8 +7,9 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.models.feature_model import FeatureModel
-from fogml.models.intervals import LEVELS, Intervals, half_widths_of_runs, intervals_from_residuals
+from fogml.models.intervals import LEVELS, half_widths_of_runs, intervals_from_residuals, saved_intervals
 from fogml.models.names import make_model
+from fogml.strict import as_written
 from fogml.testing.models import synthetic_run
 
 
@@ -79,7 +80,7 @@ def test_short_runs_get_intervals_too(seconds):
 
 def test_round_trip_and_bad_values():
     intervals = intervals_from_residuals(np.arange(10.0), 50.0, "whole runs")
-    assert Intervals.from_dict(intervals.as_dict()) == intervals
+    assert saved_intervals(as_written(intervals)) == intervals
     with pytest.raises(InputError, match="level"):
         intervals.half_width(1.0)
     with pytest.raises(InputError, match="too short"):

@@ -229,7 +229,7 @@ def test_a_model_without_the_hash_of_earlier_versions_is_told(folder):
         (lambda d: d["card"]["runs"][0].update(sha256="*/ x"), "key 'card.runs.0.sha256'"),
         (lambda d: d["card"]["box"].update(T=[50.0, 0.0]), "low not above high"),
         (lambda d: d["card"]["box"].update(T=["0", "50"]), "key 'card.box.T.0'"),
-        (lambda d: d["card"]["box"].update(T=[0.0]), "key 'card.box.T'"),
+        (lambda d: d["card"]["box"].update(T=[0.0]), "key 'card.box.T.1'"),
         (lambda d: d["card"]["box"].pop("T"), "no bounds of T"),
         (lambda d: d["interval"]["levels"].pop(), "do not match"),
         (lambda d: d["interval"]["levels"].__setitem__(0, 0.99), "do not match"),
