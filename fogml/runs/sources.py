@@ -14,15 +14,13 @@ from fogml.runs.facts import side_file
 _PART_BYTES = 1 << 20
 
 
-def run_sources(path: str | Path, profile: str | Path | None = None) -> tuple[Path, ...]:
-    """Every file that is read for a run: its data, its side file, and the import profile if one is used.
+def run_sources(path: str | Path) -> tuple[Path, ...]:
+    """Every file that is read for a run: its data and its side file.
 
     Parameters
     ----------
     path
         The run's file; it need not be there.
-    profile
-        Import profile that the file is read by, a path.
 
     Returns
     -------
@@ -30,7 +28,7 @@ def run_sources(path: str | Path, profile: str | Path | None = None) -> tuple[Pa
         The data file first. A side file is among them if it is there.
     """
     side = side_file(Path(path))
-    return (Path(path), *((side,) if side else ()), *((Path(profile),) if profile is not None else ()))
+    return (Path(path), *((side,) if side else ()))
 
 
 def sources_stamp(paths: Iterable[Path]) -> str:

@@ -79,15 +79,13 @@ def expected_mean_square(
     return float((np.sum(total) - np.sum(taken**2)) / len(whitener))
 
 
-def floor_square(
-    model: NoiseModel, time: ArrayLike, averaging_s: ArrayLike, *, ladder: Ladder | None = None
-) -> float:
+def floor_square(model: NoiseModel, time: ArrayLike, averaging_s: ArrayLike) -> float:
     """Square of the noise floor of a noise model in given averages, as `fogml.signals.floor` defines it.
 
     The expected variance of the averages about their mean; parameters as in `expected_mean_square`.
     """
     ones = np.ones((len(np.asarray(time)), 1))
-    return expected_mean_square(model, time, averaging_s, fitted=Fitted(ones, ordinary=True), ladder=ladder)
+    return expected_mean_square(model, time, averaging_s, fitted=Fitted(ones, ordinary=True))
 
 
 def mean_square_draws(
@@ -98,14 +96,13 @@ def mean_square_draws(
     rng: np.random.Generator,
     *,
     fitted: Fitted | None = None,
-    ladder: Ladder | None = None,
 ) -> FloatArray:
     """Mean squares that the noise leaves in averages of so many drawn runs, shape (draws,).
 
     As `expected_mean_square`; their scatter is what one run's floor is worth. Constants with a prior
     are at its mean here and scatter with it there, where residuals are a little larger.
     """
-    whitener = Whitener(model, time, averaging_s, ladder)
+    whitener = Whitener(model, time, averaging_s)
     n = len(whitener)
     basis, ordinary = None, fitted is not None and fitted.ordinary
     if fitted is not None:

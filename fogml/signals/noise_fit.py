@@ -100,7 +100,6 @@ def fit_noise(
     columns: Sequence[ArrayLike] | None = None,
     *,
     prior: NoisePrior | None = None,
-    deviations: ArrayLike | None = None,
     averaging_s: float | None = None,
     most: int = 4096,
 ) -> NoiseFit:
@@ -117,9 +116,6 @@ def fit_noise(
         Regressors of each series, shape (n, p), whose constants all series share.
     prior
         None: wide log-normal priors, a factor of 10 about what the Allan variance shows at a glance.
-    deviations
-        Prior standard deviations of the constants of `columns`, shape (p,); infinite for free ones,
-        as all are if None.
     averaging_s
         What samples are means over [s]; the median step of the first series if None.
     most
@@ -138,7 +134,7 @@ def fit_noise(
     """
     from scipy.optimize import minimize
 
-    data = fit_data(time, series, columns, deviations, averaging_s, most)
+    data = fit_data(time, series, columns, averaging_s, most)
     prior = _glance(data) if prior is None else prior
     centre = np.array([getattr(prior.centre, name) for name in NAMES])
     free = np.flatnonzero(centre > 0.0)
@@ -177,8 +173,8 @@ def _log_likelihood(data: FitData, model: NoiseModel) -> float:
     from scipy.linalg import solve_triangular
 
     total = _levels_log_likelihood(data.levels, model)
-    # Rows that the priors of the constants add belong to the columns.
-    gram = data.prior_rows.T @ data.prior_rows
+    width = data.parts[0].table.shape[1]
+    gram = np.zeros((width, width))
     for part in data.parts:
         whitener, white = _whitened(part, model)
         gram += white.T @ white
@@ -202,14 +198,14 @@ def _orthonormal(data: FitData, model: NoiseModel) -> FitData:
     from scipy.linalg import solve_triangular
 
     whitened = [_whitened(part, model)[1] for part in data.parts]
-    root = np.array(np.linalg.qr(np.vstack((*whitened, data.prior_rows)), mode="r"))
+    root = np.array(np.linalg.qr(np.vstack(whitened), mode="r"))
     # Values keep their size, also where the columns hold all of them.
     last = float(root[-1, -1]) or 1.0
     root[-1, -1] = last
     change = solve_triangular(root, np.diag([*np.ones(len(root) - 1), last]))
     parts = tuple(replace(part, table=part.table @ change) for part in data.parts)
     log_det = float(np.sum(np.log(np.abs(np.diag(root)[:-1]))))
-    return replace(data, parts=parts, prior_rows=data.prior_rows @ change, log_det=log_det)
+    return replace(data, parts=parts, log_det=log_det)
 
 
 def _levels_log_likelihood(levels: Sequence[Level], model: NoiseModel) -> float:

@@ -60,8 +60,6 @@ class FitData:
         Differences inside the averages, of all series.
     glance
         Differences at every level, for a first look.
-    prior_rows
-        Rows that the priors of constants add to the columns, shape (r, p + 1).
     log_det
         Logarithm of the volume that the given columns span in the frame of the present ones.
     """
@@ -69,7 +67,6 @@ class FitData:
     parts: tuple[Part, ...]
     levels: tuple[Level, ...]
     glance: tuple[Level, ...]
-    prior_rows: FloatArray
     log_det: float = 0.0
 
 
@@ -77,7 +74,6 @@ def fit_data(
     time: Sequence[ArrayLike],
     series: Sequence[ArrayLike],
     columns: Sequence[ArrayLike] | None,
-    deviations: ArrayLike | None,
     averaging_s: float | None,
     most: int,
 ) -> FitData:
@@ -98,7 +94,7 @@ def fit_data(
         blocks = block_averages(t, x, y, window_s=sample_s * 2**octaves)
         x, y = blocks.values
         averages.append((t[blocks.stops - 1], blocks.counts * sample_s, x, y))
-    shared, prior_rows = _columns([x for _, _, x, _ in averages], deviations)
+    shared = _columns([x for _, _, x, _ in averages])
     parts = []
     edges = np.cumsum([0] + [len(t) for t, _, _, _ in averages])
     for (t, a, _, y), low, high in zip(averages, edges[:-1], edges[1:]):
@@ -107,7 +103,7 @@ def fit_data(
         ladder = flicker_ladder(float(np.median(a)), length)
         table = np.column_stack((shared[low:high], y - y.mean()))
         parts.append(Part(table, Whitener(_ANY, t, a, ladder)))
-    return FitData(tuple(parts), tuple(levels), _merged(glance), prior_rows)
+    return FitData(tuple(parts), tuple(levels), _merged(glance))
 
 
 def _checked(
@@ -134,24 +130,14 @@ def _checked(
     return [times[i] for i in kept], [values[i] for i in kept], [tables[i] for i in kept]
 
 
-def _columns(tables: list[FloatArray], deviations: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
-    """Columns of all series on top of each other, free ones as an orthonormal basis; prior rows."""
-    stacked = np.vstack(tables)
-    shared = stacked.shape[1]
-    spread = np.full(shared, np.inf) if deviations is None else np.asarray(deviations, dtype=np.float64)
-    if spread.shape != (shared,) or not np.all(spread > 0.0):
-        raise InputError(f"noise fit: {shared} positive deviations of constants were expected, not {spread}")
+def _columns(tables: list[FloatArray]) -> FloatArray:
+    """Columns of all series on top of each other, beside a constant of each, as an orthonormal basis."""
     which = np.repeat(np.arange(len(tables)), [len(x) for x in tables])
     own = (which[:, None] == np.arange(len(tables))).astype(np.float64)
-    known = np.isfinite(spread)
-    free = np.column_stack((own, stacked[:, ~known]))
+    free = np.column_stack((own, np.vstack(tables)))
     sizes = np.sqrt(np.sum(free**2, axis=0))
     left, strength, _ = np.linalg.svd(free / np.where(sizes > 0.0, sizes, 1.0), full_matrices=False)
-    basis = left[:, strength > _INDEPENDENT * strength[0]]
-    scaled = stacked[:, known] * spread[known]
-    rows = np.zeros((scaled.shape[1], basis.shape[1] + scaled.shape[1] + 1))
-    rows[:, basis.shape[1] : -1] = np.eye(scaled.shape[1])
-    return np.column_stack((basis, scaled)), rows
+    return np.asarray(left[:, strength > _INDEPENDENT * strength[0]])
 
 
 def _differences(time: FloatArray, values: FloatArray, columns: FloatArray, sample_s: float) -> list[Level]:

@@ -55,7 +55,6 @@ def whiteness(
     *,
     sample_s: float = 1.0,
     longest_lag: int = 64,
-    fitted: int = 0,
     level: float = 0.01,
 ) -> Whiteness:
     """Check innovations for autocorrelation and for their variance at all time scales.
@@ -72,9 +71,6 @@ def whiteness(
         Sample interval [s], for the words.
     longest_lag
         Longest lag [samples]; lags are powers of two up to it.
-    fitted
-        Constants fitted to these very innovations. They lower the expected sum of squares; keep
-        the check to held-out data where they are many.
     level
         Level of the test as a whole.
 
@@ -85,8 +81,8 @@ def whiteness(
     """
     series = [np.asarray(part, dtype=np.float64) for part in _parts(innovations)]
     count = sum(len(part) for part in series)
-    if count < _FEWEST + fitted:
-        raise InputError(f"whiteness: {count} innovations, at least {_FEWEST + fitted} are needed")
+    if count < _FEWEST:
+        raise InputError(f"whiteness: {count} innovations, at least {_FEWEST} are needed")
     if not all(np.all(np.isfinite(part)) for part in series):
         raise InputError("whiteness: an innovation is not finite")
     squares = sum(float(part @ part) for part in series)
@@ -104,14 +100,12 @@ def whiteness(
     while True:
         blocks = [_block_sums(part, scale) for part in series]
         number = sum(len(part) for part in blocks)
-        # Fitted constants take their share of the freedom at the longest scales, mostly.
-        free = number - fitted
-        if free < _FEWEST_BLOCKS:
+        if number < _FEWEST_BLOCKS:
             break
         found = sum(float(part @ part) for part in blocks) / scale
         scales.append(scale)
-        ratios.append(found / free)
-        scale_p.append(min(1.0, 2.0 * min(chi2_cdf(found, free), chi2_sf(found, free))))
+        ratios.append(found / number)
+        scale_p.append(min(1.0, 2.0 * min(chi2_cdf(found, number), chi2_sf(found, number))))
         scale *= 2
 
     p_values = np.concatenate((lag_p, scale_p))
