@@ -8,28 +8,25 @@ from inspect import get_annotations
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from fogml import __version__
 from fogml.cli.given import Given, option
 from fogml.errors import InputError, known_are, listed, quoted
 from fogml.outputs import check_is_no_folder, sole_writer, whole_file
-from fogml.strict import first_fault
+from fogml.strict import Strict, first_fault
 from fogml.yaml_text import read_yaml, yaml_text
 
 SHIPPED = "shipped:"
 """What a run's path begins with when it names a recording that ships."""
 
 
-class Settings(BaseModel):
+class Settings(Strict):
     """What every command takes. Unknown keys are errors.
 
     A setting is declared once: its type, default and checks, and as `Given` how it stands on a command line.
     """
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, protected_namespaces=()
-    )
     job: ClassVar[str] = ""
     """``module:function`` that does the job, of settings and terminal; False: a limit was not met."""
     config_argument: ClassVar[str] = ""

@@ -8,10 +8,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BeforeValidator, Field, ValidationError, field_validator
 
 from fogml.errors import InputError, known_are, quoted
-from fogml.strict import first_fault
+from fogml.strict import Strict, first_fault
 from fogml.yaml_text import read_yaml, yaml_text
 
 EARTH_RATE_DEG_H = 15.041067
@@ -41,11 +41,10 @@ def _moment(value: Any) -> Any:
         raise ValueError("a date and time by ISO 8601 was expected") from None
 
 
-class ScaleFactor(BaseModel):
+class ScaleFactor(Strict):
     """Nominal K0: gyro [deg/h] = counts / value."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-    value: float = Field(allow_inf_nan=False)
+    value: float
     unit: Literal["count per deg/h", "count per deg/s"] = "count per deg/h"
 
     @field_validator("value")
@@ -61,17 +60,16 @@ class ScaleFactor(BaseModel):
         return self.value if self.unit == "count per deg/h" else self.value / 3600.0
 
 
-class Heading(BaseModel):
+class Heading(Strict):
     """A horizontal input axis, in degrees clockwise from north."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-    heading: float = Field(allow_inf_nan=False)
+    heading: float
 
 
 class Direction(Heading):
     """Any direction: degrees clockwise from north, and degrees above the horizon."""
 
-    elevation: float = Field(default=0.0, ge=-90.0, le=90.0, allow_inf_nan=False)
+    elevation: float = Field(default=0.0, ge=-90.0, le=90.0)
 
 
 _Named = Literal["up", "down", "north", "south", "east", "west"]
@@ -79,16 +77,15 @@ InputAxis = _Named | Heading
 TableAxis = _Named | Direction
 
 
-class AxisFacts(BaseModel):
+class AxisFacts(Strict):
     """What a side file of three gyros may state of one."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     input_axis: InputAxis | None = None
     table_axis: TableAxis | None = None
     scale_factor: ScaleFactor | None = None
 
 
-class Facts(BaseModel):
+class Facts(Strict):
     """The facts about the set-up that a side file may state. All optional.
 
     Latitude in degrees north; `powered_on` in seconds on the run's clock. The `table_axis` is what the table
@@ -97,7 +94,6 @@ class Facts(BaseModel):
     of a file that holds three.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     unit: str | None = None
     axis: str | None = None
     latitude: float | None = Field(default=None, ge=-90.0, le=90.0)
@@ -105,7 +101,7 @@ class Facts(BaseModel):
     table_axis: TableAxis | None = None
     scale_factor: ScaleFactor | None = None
     axes: dict[Literal["x", "y", "z"], AxisFacts] | None = None
-    powered_on: float | None = Field(default=None, allow_inf_nan=False)
+    powered_on: float | None = None
     started: Annotated[datetime | None, BeforeValidator(_moment)] = None
     in_use_since: Annotated[datetime | None, BeforeValidator(_moment)] = None
     compensated: bool | None = None

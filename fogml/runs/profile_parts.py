@@ -6,9 +6,10 @@ import re
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from fogml.runs.units import canonical_unit
+from fogml.strict import Strict
 
 _DECIMAL = r"([-+]?\d{1,30}(?:\.\d{0,30})?(?:[eE][-+]?\d{1,3})?)"
 _QUOTIENT = re.compile(rf"\s*{_DECIMAL}\s*/\s*{_DECIMAL}\s*\Z", re.ASCII)
@@ -30,10 +31,6 @@ Quotient = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)
 STAMP = "stamp"
 """The unit of a clock of dates and times of day."""
 Source = str | Annotated[int, Field(ge=0, strict=True)]
-
-
-class Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class ImportColumn(Strict):

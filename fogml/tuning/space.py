@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict, FiniteFloat, field_validator, model_validator
+from pydantic import FiniteFloat, field_validator, model_validator
 
 from fogml.errors import InputError
+from fogml.strict import Strict
 
 if TYPE_CHECKING:
     import optuna
@@ -23,11 +24,10 @@ BUILDER, WINDOW = "{builder}", "{window}"
 Scalar = bool | int | float | str
 
 
-class Range(BaseModel):
+class Range(Strict):
     """Numbers from `low` to `high`, both included; whole ones if both are whole; evenly in the logarithm
     where `log` is set."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     low: int | FiniteFloat
     high: int | FiniteFloat
     log: bool = False
@@ -64,7 +64,7 @@ class Choice:
     made: Weighed | None = None
 
 
-class Space(BaseModel):
+class Space(Strict):
     """What a sweep may choose among.
 
     Attributes
@@ -81,7 +81,6 @@ class Space(BaseModel):
         Names of models, each with its parameters to choose.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     features: dict[str, list[str]]
     builder: list[str] = ["block"]
     window: Range | list[FiniteFloat] | FiniteFloat = 64.0

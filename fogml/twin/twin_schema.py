@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError, create_model
 
 from fogml.errors import known_are, quoted
-from fogml.strict import first_fault
+from fogml.strict import Strict, first_fault
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.nominal import UNITS
 from fogml.twin.optics import Winding
@@ -58,23 +58,19 @@ LINE = (
 )
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class Stated(_Strict):
+class Stated(Strict):
     """A constant: its value, its unit, and the spread of its prior where it has one."""
 
-    value: float = Field(allow_inf_nan=False)
+    value: float
     unit: str | None = None
 
 
 class _WithDeviation(Stated):
-    sd: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
+    sd: float | None = Field(default=None, ge=0.0)
 
 
 class _WithFactor(Stated):
-    factor: float | None = Field(default=None, ge=1.0, allow_inf_nan=False)
+    factor: float | None = Field(default=None, ge=1.0)
 
 
 def _plain(value: Any) -> Any:
@@ -84,22 +80,22 @@ def _plain(value: Any) -> Any:
 
 def _section(
     name: str, quantities: Iterable[Quantity], kind: type[Stated] = Stated, **more: Any
-) -> type[_Strict]:
+) -> type[Strict]:
     fields: dict[str, Any] = {
         q.name: (Annotated[kind | None, BeforeValidator(_plain)], None) for q in quantities
     }
-    return create_model(name, __base__=_Strict, **fields, **more)
+    return create_model(name, __base__=Strict, **fields, **more)
 
 
-def _optional(kind: type[_Strict]) -> tuple[Any, Any]:
+def _optional(kind: type[Strict]) -> tuple[Any, Any]:
     """A section that may be left out, then with nothing stated in it."""
     return kind, Field(default_factory=kind)
 
 
-class _UncertaintySection(_Strict):
+class _UncertaintySection(Strict):
     source: str = ""
     parameters: list[str]
-    covariance: list[list[Annotated[float, Field(allow_inf_nan=False)]]]
+    covariance: list[list[float]]
 
 
 _EFFECTS: Any = dict[str, dict[str, Annotated[Stated, BeforeValidator(_plain)]]]
@@ -109,7 +105,7 @@ _LINE_SECTION: Any = _section("_Line", LINE, layers=(Annotated[int, Field(ge=1, 
 _ENDS_SECTION: Any = _section("_Ends", ENDS) | None
 TWIN_FILE: Any = create_model(
     "_File",
-    __base__=_Strict,
+    __base__=Strict,
     schema_=(_SCHEMA, Field(alias="schema")),
     name=(str | None, None),
     description=(str, ""),
