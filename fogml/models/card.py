@@ -73,6 +73,10 @@ class TrainingCard:
     slices: SavedSlices | None = None
     thermometer: SavedLimits | None = None
 
+    def __post_init__(self) -> None:
+        # What features show of their box is a view, which no file holds.
+        object.__setattr__(self, "box", dict(self.box))
+
 
 def training_card(
     runs: Sequence[Run],
@@ -108,7 +112,7 @@ def training_card(
         sample_s=runs[0].sample_s,
         earth_known=runs[0].earth_known,
         rows=rows,
-        box=dict(features.box) if features is not None else {},
+        box=features.box if features is not None else {},
         notes=tuple(notes),
         slices=slices_of(features) if features is not None else None,
         thermometer=saved_limits(features.thermometer) if features is not None else None,
