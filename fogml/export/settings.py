@@ -14,6 +14,7 @@ from fogml.export.c_source import C_DTYPES
 from fogml.export.check import Difference
 from fogml.export.plan import Plan
 from fogml.export.storage import FILE_DTYPES
+from fogml.intervals import LEVEL
 from fogml.models.base import DriftModel
 
 SCHEMA = "fogml.export/1"
@@ -67,7 +68,7 @@ def tolerance_of(model: DriftModel, settings: ExportSettings, dtype: str, binned
     if settings.tolerance is not None:
         return settings.tolerance
     share = max(TOLERANCE_SHARE[dtype], BINNED_SHARE if binned else 0.0)
-    return max(LEAST_TOLERANCE[dtype], share * float(model.intervals_.half_width(0.9)))
+    return max(LEAST_TOLERANCE[dtype], share * float(model.intervals_.half_width(LEVEL)))
 
 
 def check_settings(settings: ExportSettings, dtype: str) -> None:

@@ -18,6 +18,7 @@ from fogml.export.plan import Plan
 from fogml.export.segments import Segments, segments
 from fogml.export.settings import SCHEMA, report_tail
 from fogml.export.static_curve import StaticCurve
+from fogml.intervals import LEVEL
 from fogml.models.base import DriftModel
 from fogml.runs.run import Run
 from fogml.yaml_text import read_yaml
@@ -184,7 +185,7 @@ def by_axis(models: Sequence[DriftModel]) -> dict[str, DriftModel]:
 def _tolerance(settings: TableSettings, model: DriftModel) -> float:
     if settings.tolerance is not None:
         return settings.tolerance
-    return TOLERANCE_SHARE * float(model.intervals_.half_width(0.9))
+    return TOLERANCE_SHARE * float(model.intervals_.half_width(LEVEL))
 
 
 def _loss(model: DriftModel, plan: Plan, table: Segments, train: Sequence[Run]) -> dict[str, Any] | None:

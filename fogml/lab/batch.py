@@ -13,6 +13,7 @@ from urllib.parse import quote
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.intervals import LEVEL
 from fogml.json_files import finite_json
 from fogml.lab.acceptance import ACCEPTED, INCOMPLETE, NO_LIMITS, REJECTED
 from fogml.lab.acceptance import SCHEMA as ACCEPTANCE
@@ -87,7 +88,7 @@ def _interval(part: int, whole: int) -> tuple[float, float]:
     """The exact 90 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
     from scipy.stats import binomtest
 
-    found = binomtest(part, whole).proportion_ci(0.9, method="exact")
+    found = binomtest(part, whole).proportion_ci(LEVEL, method="exact")
     return float(found.low), float(found.high)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
-from fogml.intervals import Z90
+from fogml.intervals import LEVEL, Z90
 from fogml.models.base import OUTSIDE, DriftModel
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
@@ -148,7 +148,7 @@ def record_run(
         kept = evaluation.full & evaluation.settled
         if moving.any():
             kept &= ~transition_mask(block)
-        half = model.intervals_.half_width(0.9, evaluation.excess)
+        half = model.intervals_.half_width(LEVEL, evaluation.excess)
         warmth = leading_temperature(block)
         means.add(
             block.time,
