@@ -17,7 +17,7 @@ from fogml.gap.posterior import Judgement
 from fogml.gap.result_parts import CauseShare, HowFar
 from fogml.gap.rows import Rows
 from fogml.gap.where import averages
-from fogml.intervals import Z90
+from fogml.intervals import TAILS, Z90
 from fogml.runs.regimes import Regimes
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
@@ -167,7 +167,7 @@ class HeldOut:
             room = np.maximum(aft - self._rng.choice(self._noises, (draws, draws)), 0.0)
             closing = rec - aft + np.minimum(moved[:, None], room)
             drawn = closing / np.maximum(rec - self._floors[None, :], self._settings.least_gap * gap)
-            low, high = np.quantile(drawn, (0.05, 0.95))
+            low, high = np.quantile(drawn, TAILS)
             interval = min(float(low), closed), max(float(high), closed)
         if self._noisier:
             note = f"{self._noisier}{'; ' if note else ''}{note}"
@@ -280,7 +280,7 @@ def _told(groups: Iterable[str], values: FloatArray, run: str | None, regime: st
     """Shares of values of shape (groups, 1 + draws)."""
     total = values.sum(axis=0)
     shares = values / np.where(np.abs(total) > 0.0, total, np.inf)
-    low, high = np.quantile(shares[:, 1:], (0.05, 0.95), axis=1)
+    low, high = np.quantile(shares[:, 1:], TAILS, axis=1)
     rows = zip(groups, shares[:, 0], low, high)
     return [
         CauseShare(name, run, regime, float(s), (float(min(a, s)), float(max(b, s))))

@@ -46,25 +46,11 @@ def showing_run(
 
     Parameters
     ----------
-    twin
-        The twin, whose plant and noise the run would have.
-    noise
-        Noise of the gyro.
-    constants
-        Nominal constants at which effects that act on inputs are taken.
+    twin, noise, constants, hours, seed, progress, facts, most
+        As in `fogml.gap.planning.separating.separating_run`.
     ids
         The effects. Those that a record itself tells, such as the steps of its sensors, no programme shows
         any better: they are left out.
-    hours
-        Longest time of the programme [h].
-    seed
-        Of the search.
-    progress
-        Told what is being done.
-    facts
-        Of the set-up, whose mounting then holds; if None the input axis may point up or north.
-    most
-        Programmes that are tried at most.
 
     Returns
     -------
