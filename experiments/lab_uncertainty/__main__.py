@@ -92,9 +92,10 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
     (
         "A next unit drawn to its fleet (`fleet`)",
         fleets,
-        100,
-        "Coefficients and prediction intervals of the model of a next unit, shared among ten fleets a case; "
-        "units' constants are normal. Units that are left to their own runs are not counted.",
+        200,
+        "Coefficients and prediction intervals of the model of a next unit, shared among ten fleets a case, "
+        "and constants of these fleets' own units, of cycles of 7 h, in the columns of `fleet.json`; units' "
+        "constants are normal. Units that are left to their own runs are not counted.",
     ),
     (
         "Alarms (`monitor`)",

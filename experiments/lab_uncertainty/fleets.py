@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.lab_uncertainty.measure import Told, coverage, of_errors, of_runs
 from experiments.lab_uncertainty.models import share_within
-from experiments.lab_uncertainty.signals import Noise, lagged, thermometer
+from experiments.lab_uncertainty.signals import NAVIGATION, TACTICAL, Noise, lagged, thermometer
 from fogml.arrays import FloatArray
 from fogml.fleet.constants import FleetConstants, UnitConstants, fleet_constants
 from fogml.fleet.form import FORM
@@ -41,8 +41,14 @@ class Fleet:
 CASES = {
     "24 units, 4 h": Fleet(hours=4.0),
     "6 units, 4 h": Fleet(units=6, hours=4.0),
-    "24 units, tactical noise, 4 h": Fleet(hours=4.0, noise=Noise(0.02, 0.05, 0.05)),
+    "24 units, tactical noise, 4 h": Fleet(hours=4.0, noise=TACTICAL),
+    "24 units, tactical noise, whole cycle": Fleet(noise=TACTICAL),
+    "24 units, flicker, 4 h": Fleet(hours=4.0, noise=Noise(0.02, 0.05)),
+    "24 units, navigation grade, 4 h": Fleet(hours=4.0, noise=NAVIGATION),
     "24 units of two runs, bias moves, 4 h": Fleet(hours=4.0, runs=2, moves=0.05),
+    "24 units of two runs, tactical noise, bias moves, 4 h": Fleet(
+        hours=4.0, noise=TACTICAL, runs=2, moves=0.05
+    ),
 }
 
 
@@ -66,15 +72,16 @@ def unit(rng: np.random.Generator) -> FloatArray:
 
 
 @lru_cache(maxsize=FLEETS)
-def fleet_of(case: Fleet, seed: int) -> FleetConstants:
-    """The constants of one fleet."""
+def fleet_of(case: Fleet, seed: int) -> tuple[FleetConstants, list[FloatArray]]:
+    """The constants of one fleet, and its units' true ones."""
     rng = np.random.default_rng([seed, 77])
-    units = []
+    units, sizes = [], []
     for _ in range(case.units):
         size = unit(rng)
+        sizes.append(size)
         runs = [recorded(size, case, rng, 24.0, 1.0 + 0.2 * number) for number in range(case.runs)]
         units.append(UnitConstants.of(runs, FORM))
-    return fleet_constants(units)
+    return fleet_constants(units), sizes
 
 
 def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
@@ -85,9 +92,8 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
     for repeat in range(repeats):
         rng = np.random.default_rng([seed, repeat])
         size = unit(rng)
-        model = shared_model(fleet_of(case, seed + repeat % FLEETS)).fit(
-            recorded(size, case, rng, case.hours, 1.0)
-        )
+        fleet, _ = fleet_of(case, seed + repeat % FLEETS)
+        model = shared_model(fleet).fit(recorded(size, case, rng, case.hours, 1.0))
         if any("left to its own runs" in note for note in model.card_.notes):
             continue
         fitted = model.describe()["coefficients"]
@@ -97,7 +103,20 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
         test = recorded(size, case, rng, 24.0, 0.8)
         shares.append(share_within(model, test))
     rows = [coverage(name, key, every) for key, every in told.items()]
+    rows += _of_units([fleet_of(case, seed + number) for number in range(min(FLEETS, repeats))], name)
     return [*rows, of_runs(name, "averages over 100 s on another run", shares)]
+
+
+def _of_units(fleets: list[tuple[FleetConstants, list[FloatArray]]], name: str) -> list[dict[str, Any]]:
+    """Rows of the fleets' tables of their own units' constants, in the tables' columns."""
+    told: dict[str, list[Told | None]] = {}
+    for fleet, sizes in fleets:
+        into = np.linalg.inv(fleet.prior.to_raw())
+        for size, values, errors in zip(sizes, fleet.values, fleet.errors, strict=True):
+            true = into @ list(_as_terms(size).values())
+            for key, value, truth, error in zip(fleet.names, values, true, errors, strict=True):
+                told.setdefault(key, []).append(of_errors(value - truth, error))
+    return [coverage(name, f"{key} of the fleet's units", every) for key, every in told.items()]
 
 
 def _as_terms(size: FloatArray) -> dict[str, float]:

@@ -12,7 +12,7 @@ from fogml.arrays import FloatArray
 from fogml.features.parse import parse_features
 from fogml.fleet.constants import FORM, FleetConstants, UnitConstants, fleet_constants
 from fogml.fleet.shared import ODD, DrawnMember, size_priors
-from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
+from fogml.models.mixed_effects import fit_mixed_effects
 from fogml.models.mixed_effects_model import averages_of, composed
 from fogml.models.prior import agreement
 from fogml.models.table import run_rows, training_table
@@ -71,7 +71,7 @@ def case(fleet: FleetConstants, seed: int, far: float, coloured: bool, hours: fl
     table = composed(averages_of([rows]), form)
     alone = fit_mixed_effects(table, form.terms).regressor()
     found = fit_mixed_effects(table, form.terms, size_priors(fleet.own, table))
-    member = DrawnMember(form, found, fleet.prior, fleet.own.get(OWN_PARTS[0], 0.0))
+    member = DrawnMember.of(form, found, table, fleet.prior, fleet.own, fleet.noise)
     drawn = member.regressor(table)
     run, drift = recorded(seed, far, coloured, 0.8)
     other = training_table([run], form)
@@ -117,8 +117,8 @@ def section(quick: bool) -> Section:
         )
     lines += [
         "",
-        "What moves a unit's rows beside its constants is a run's own slow and faster drift and white noise, "
-        "their sizes by evidence (`fogml.models.mixed_effects`).",
+        "What moves a unit's rows beside its constants is white noise, flicker, a random walk and a run's "
+        "shift (`fogml.models.generalised_least_squares`).",
     ]
     return Section("\n".join(lines), {"rows": rows})
 

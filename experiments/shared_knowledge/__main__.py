@@ -53,7 +53,7 @@ def case(fleet: FleetConstants, seed: int, hours: float, far: float) -> dict[str
     drawn = shared_model(fleet).fit(train)
     left = any("left to its own runs" in note for note in drawn.card_.notes)
     alone = MixedEffectsModel(FORM).fit(train)
-    anyway = Unchecked(fleet.features, fleet.prior.as_dict(), fleet.box, fleet.own).fit(train)
+    anyway = Unchecked(fleet.features, fleet.prior.as_dict(), fleet.box, fleet.own, fleet.noise).fit(train)
     models = (alone, drawn, anyway, make_model("auto").fit(train))
     judged = [judge(model, train, test, averaging_s=AVERAGING_S).test[0] for model in models]
     seen, with_fleet = alone.evaluate(test), anyway.evaluate(test)

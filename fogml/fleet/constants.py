@@ -1,8 +1,9 @@
 """What the units of a fleet have in common: their constants, and the prior that these make for the next.
 
 Every unit's drift is described by the same linear form, the shared part of a mixed-effects model
-(`fogml.models.mixed_effects`). Its rows are condensed to a triangle that tells all of them, each run's own
-part counting as noise, so a fleet's constants can be put together without its runs.
+(`fogml.models.mixed_effects`). The rows of each run are condensed to a triangle that tells all of them, white
+and slow noise counted (`fogml.models.generalised_least_squares`), so a fleet's constants can be put together
+without its runs.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.fleet.covariates import CovariateColumns, CovariateEffects, Covariates
 from fogml.fleet.form import FORM
+from fogml.fleet.spread import each_unit, least_squares, widening
 from fogml.intervals import SIGMA_PER_MEDIAN
 from fogml.models.box import learn_box
+from fogml.models.generalised_least_squares import runs_noise, shift_of_runs, shifted
 from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
 from fogml.models.mixed_effects_basis import SizePriors
 from fogml.models.mixed_effects_model import averages_of, composed
@@ -34,6 +37,7 @@ _FREEDOM = 5.0
 # Degrees of freedom of the fleet's t distribution: odd units do not pull at the mean.
 _WORTH_UNITS = 2.0
 # Units' worth of belief that constants vary independently, and that a covariate tells nothing of them.
+_NOISE = ("N", "B", "K")
 LEAST_UNITS = 3
 ONE_RUN = SizePriors(slow=1e-4)
 """Priors of sizes where no unit has several runs: a run's slow drift can't be told from that of one cycle."""
@@ -47,11 +51,13 @@ class UnitConstants:
     ----------
     features
         The form.
-    triangle
-        Equations ``[1, features, y]`` that tell of the constants what the rows do, their noise, in which the
-        runs' own parts are, of unit covariance, shape (k + 1, k + 2).
-    precision
-        One over the variance of a row of the triangle's; 1 as it is whitened.
+    triangles
+        Of each of r runs, equations ``[1, features, y]`` that tell of the constants what its rows do, of unit
+        noise but for the run's shift, shape (r, m, k + 2).
+    noise
+        N, B and K of the rows' noise, as `fogml.signals.noise_model.NoiseModel` has them.
+    unseen_shift
+        Standard deviation of flicker slower than a run [deg/h], which shifts it as a whole.
     rows
         Number of averaged rows.
     shift, scale
@@ -66,8 +72,9 @@ class UnitConstants:
     """
 
     features: str
-    triangle: FloatArray
-    precision: float
+    triangles: FloatArray
+    noise: dict[str, float]
+    unseen_shift: float
     rows: int
     shift: FloatArray
     scale: FloatArray
@@ -96,24 +103,35 @@ class UnitConstants:
         # One run can't tell what goes slowly from its temperature; of several the rows tell, not a prior.
         several = SizePriors(own_spread=SizePriors.noise_spread)
         found = fit_mixed_effects(table, form.terms, several if len(runs) > 1 else ONE_RUN)
-        columns, target = found.told(table, np.column_stack([np.ones(len(table)), table.X / scale]))
-        triangle = np.column_stack([columns * np.append(1.0, scale), target])
-        own = {name: found.sizes[name] for name in (OWN_PARTS if len(runs) > 1 else OWN_PARTS[2:])}
+        noise = runs_noise(table, found.sizes["noise"])
+        triangles = noise.triangles(table, np.column_stack([np.ones(len(table)), table.X / scale]))
+        own = {name: found.sizes[name] for name in (OWN_PARTS[1:] if len(runs) > 1 else OWN_PARTS[2:])}
+        if len(runs) > 1:
+            median = several.shift * float(table.y.std())
+            own[OWN_PARTS[0]] = shift_of_runs([triangles], median, several.own_spread)
         box = {name: [float(low), float(high)] for name, (low, high) in form.box.items()}
         known = dict(covariates or {})
         shift = table.X.mean(axis=0)
-        return cls(form.text, np.asarray(triangle), 1.0, len(table), shift, scale, box, known, own)
+        triangles *= np.concatenate([[1.0], scale, [1.0]])
+        density = {name: getattr(noise.model, name) for name in _NOISE}
+        unseen = noise.unseen_shift
+        return cls(form.text, triangles, density, unseen, len(table), shift, scale, box, known, own)
 
-    def in_columns(self, shift: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Information and image of the rows in the columns ``[1, (x - shift) / scale]``."""
+    def in_columns(
+        self, shift: FloatArray, scale: FloatArray, own_shift: float | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Information and image of the rows in the columns ``[1, (x - shift) / scale]``.
+
+        `own_shift` is the size of a run's own shift [deg/h], `unseen_shift` where None.
+        """
         width = len(shift)
         change = np.zeros((width + 1, width + 1))
         change[0, 0] = 1.0
         change[0, 1:] = -shift / scale
         change[1:, 1:] = np.diag(1.0 / scale)
-        columns = self.triangle[:, :-1] @ change
-        weighed = self.precision * columns.T
-        return weighed @ columns, weighed @ self.triangle[:, -1]
+        rows = shifted(self.triangles, self.unseen_shift if own_shift is None else own_shift)
+        columns = rows[:, :-1] @ change
+        return columns.T @ columns, columns.T @ rows[:, -1]
 
     def as_dict(self) -> dict[str, Any]:
         """The constants as JSON-ready values."""
@@ -132,11 +150,12 @@ class UnitConstants:
             If they are others.
         """
         try:
-            names = ("triangle", "shift", "scale")
+            names = ("triangles", "shift", "scale")
             arrays = {name: np.asarray(values[name], dtype=np.float64) for name in names}
             found = cls(
                 features=str(values["features"]),
-                precision=float(values["precision"]),
+                noise={name: float(values["noise"][name]) for name in _NOISE},
+                unseen_shift=float(values["unseen_shift"]),
                 rows=int(values["rows"]),
                 box=dict(values["box"]),
                 covariates={
@@ -145,8 +164,8 @@ class UnitConstants:
                 own={str(name): float(value) for name, value in dict(values.get("own", {})).items()},
                 **arrays,
             )
-            shape = (found.triangle.ndim, found.triangle.shape[-1:], found.scale.shape)
-            if shape != (2, (len(found.shift) + 2,), found.shift.shape):
+            shape = (found.triangles.ndim, found.triangles.shape[-1:], found.scale.shape)
+            if shape != (3, (len(found.shift) + 2,), found.shift.shape):
                 raise ValueError("sizes don't belong together")
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise InputError(
@@ -176,7 +195,10 @@ class FleetConstants:
     box
         Range of each atom that half of the units cover.
     own
-        Sizes of runs' own parts, root of the mean square over units [deg/h].
+        Sizes of runs' own parts [deg/h]: of the shift as the runs of all units together tell it, of others
+        the root of the mean square over units.
+    noise
+        N, B and K of the rows' noise, roots of the mean squares over units.
     """
 
     features: str
@@ -187,6 +209,7 @@ class FleetConstants:
     distances: FloatArray
     box: dict[str, list[float]]
     own: dict[str, float]
+    noise: dict[str, float]
 
     @property
     def names(self) -> list[str]:
@@ -213,16 +236,22 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
         raise InputError("the units' constants are of different forms; run the fleet with one form for all")
     shift = np.mean([unit.shift for unit in units], axis=0)
     scale = np.sqrt(np.mean([unit.scale**2 for unit in units], axis=0))
-    seen = [unit.in_columns(shift, scale) for unit in units]
+    sizes = {name: [unit.own[name] for unit in units if name in unit.own] for name in OWN_PARTS}
+    own = {name: float(np.sqrt(np.mean(np.square(found)))) for name, found in sizes.items() if found}
+    if sizes[OWN_PARTS[0]]:
+        # Runs of all units together tell it better than the mean of what those of each do.
+        median = float(np.median(sizes[OWN_PARTS[0]]))
+        own[OWN_PARTS[0]] = shift_of_runs([unit.triangles for unit in units], median, SizePriors.noise_spread)
+    seen = [unit.in_columns(shift, scale, own.get(OWN_PARTS[0])) for unit in units]
     width = len(shift) + 1
     columns = CovariateColumns.of([unit.covariates for unit in units])
     rows = np.array([columns.row(unit.covariates)[0] for unit in units])
     design = np.column_stack([np.ones(len(units)), rows])
     draw = np.diag(np.append(0.0, np.full(rows.shape[1], _WORTH_UNITS)))
-    middle, covariance = _begin(seen, width)
+    middle, covariance = _begin(seen)
     centres = np.tile(middle, (len(units), 1))
     for _ in range(_ROUNDS):
-        means, spreads, distances = _each(seen, centres, covariance)
+        means, spreads, distances = each_unit(seen, centres, covariance)
         weights = (_FREEDOM + width) / (_FREEDOM + distances)
         inverse = np.linalg.inv(design.T @ (weights[:, None] * design) + draw)
         slopes = inverse @ design.T @ (weights[:, None] * means)
@@ -237,13 +266,15 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
         centres, covariance = new_centres, new
         if still:
             break
-    means, spreads, distances = _each(seen, centres, covariance)
-    errors = np.sqrt(np.diagonal(spreads, axis1=1, axis2=2))
+    *_, distances = each_unit(seen, centres, covariance)
     # What the covariates' slopes take of the units' freedom.
     taken = float(np.einsum("ui,ij,uj,u->", design, inverse, design, weights)) - 1.0
     left = max(len(units) - taken, 1.0)
+    wider = widening(seen, centres, covariance, weights) * np.sqrt(left / len(units))
     covariance = covariance * (len(units) / left) / _of_normal(width)
-    within = Prior(slopes[0], covariance, shift, scale, left)
+    within = Prior(slopes[0], covariance, shift, scale, left, wider)
+    means, spreads, _ = each_unit(seen, centres, within.of_a_next)
+    errors = np.sqrt(np.diagonal(spreads, axis1=1, axis2=2))
     spread = np.atleast_2d(rows.T @ rows / len(units)) if rows.shape[1] else np.empty((0, 0))
     effects = CovariateEffects(columns, slopes[1:], spread, inverse, within)
     prior = effects.prior({})
@@ -251,10 +282,9 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
         name: [float(np.median([unit.box[name][end] for unit in units])) for end in (0, 1)]
         for name in units[0].box
     }
-    sizes = {name: [unit.own[name] for unit in units if name in unit.own] for name in OWN_PARTS}
-    own = {name: float(np.sqrt(np.mean(np.square(found)))) for name, found in sizes.items() if found}
     distances = np.sqrt(distances / width)
-    return FleetConstants(units[0].features, prior, effects, means, errors, distances, box, own)
+    noise = {name: float(np.sqrt(np.mean([unit.noise[name] ** 2 for unit in units]))) for name in _NOISE}
+    return FleetConstants(units[0].features, prior, effects, means, errors, distances, box, own, noise)
 
 
 def _of_normal(width: int) -> float:
@@ -271,26 +301,9 @@ def _of_normal(width: int) -> float:
     )
 
 
-def _begin(seen: Sequence[tuple[FloatArray, FloatArray]], width: int) -> tuple[FloatArray, FloatArray]:
-    """Mean and covariance of the units' own least-squares constants, told apart by a little ridge."""
-    own = np.array(
-        [np.linalg.solve(info + 1e-9 * np.trace(info) / width * np.eye(width), image) for info, image in seen]
-    )
+def _begin(seen: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    """Mean and covariance of the units' own least-squares constants."""
+    own, _ = least_squares(seen)
     spread = np.median(np.abs(own - np.median(own, axis=0)), axis=0) * SIGMA_PER_MEDIAN
     least = 1e-6 * max(float(np.abs(own).max()), 1e-12)
     return np.median(own, axis=0), np.diag(np.maximum(spread, least) ** 2)
-
-
-def _each(
-    seen: Sequence[tuple[FloatArray, FloatArray]], centres: FloatArray, covariance: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Posterior mean and covariance of every unit, and its expected squared distance from its centre."""
-    inverse = np.linalg.inv(covariance)
-    means, spreads, distances = [], [], []
-    for (information, image), mean in zip(seen, centres, strict=True):
-        spread = np.linalg.inv(information + inverse)
-        own = spread @ (image + inverse @ mean)
-        means.append(own)
-        spreads.append(spread)
-        distances.append(float((own - mean) @ inverse @ (own - mean) + np.trace(inverse @ spread)))
-    return np.array(means), np.array(spreads), np.array(distances)

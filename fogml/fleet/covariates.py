@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -101,8 +101,7 @@ class CovariateEffects:
         unknown = self.slopes[~known]
         covariance = self.within.covariance * (1.0 + design @ self.inverse @ design - self.inverse[0, 0])
         covariance = covariance + unknown.T @ self.spread[np.ix_(~known, ~known)] @ unknown
-        mean = self.within.mean + row @ self.slopes
-        return Prior(mean, covariance, self.within.shift, self.within.scale, self.within.units)
+        return replace(self.within, mean=self.within.mean + row @ self.slopes, covariance=covariance)
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready values."""

@@ -14,14 +14,21 @@ from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.fleet.constants import ONE_RUN, FleetConstants
 from fogml.fleet.covariates import CovariateEffects, Covariates
-from fogml.models.combination import SharedMember
+from fogml.models.combination import LeftOut, SharedMember
+from fogml.models.generalised_least_squares import (
+    RunsNoise,
+    runs_noise,
+    shift_of_runs,
+    shifted,
+)
 from fogml.models.linear import LinearRegressor
-from fogml.models.mixed_effects import OWN_PARTS, linear_regressor
+from fogml.models.mixed_effects import OWN_PARTS, MixedEffects, linear_regressor
 from fogml.models.mixed_effects_basis import SizePriors
 from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.prior import Prior, agreement, posterior
 from fogml.models.table import TrainingTable
 from fogml.runs.run import Run
+from fogml.signals.noise_model import NoiseModel
 
 COVERED = 0.25
 """Least share of the fleet's temperatures in a unit's runs if the fleet is followed beyond them."""
@@ -33,23 +40,49 @@ _BEYOND = 0.01
 
 @dataclass(frozen=True, eq=False)
 class DrawnMember(SharedMember):
-    """A unit's shared part with its fleet's prior, the sizes of runs' own parts kept.
+    """A unit's shared part with its fleet's prior, the noise of its rows kept.
 
     Attributes
     ----------
     prior
         The fleet's.
+    noise
+        Of the rows.
     shift
-        Size of a run's own shift [deg/h], as several runs of other units tell it.
+        Size of a run's own shift [deg/h].
     """
 
     prior: Prior
+    noise: RunsNoise
     shift: float
+
+    @classmethod
+    def of(
+        cls,
+        features: Features,
+        found: MixedEffects,
+        table: TrainingTable,
+        prior: Prior,
+        own: Mapping[str, float],
+        fleets_noise: Mapping[str, float],
+    ) -> Self:
+        """The part of a unit, from averages of features, and sizes of its fleet's own parts and noise."""
+        noise = runs_noise(table, found.sizes["noise"])
+        sizes = size_priors(own, table)
+        if fleets_noise:
+            noise = noise.like_others(table, NoiseModel(**fleets_noise), sizes.own_spread)
+        known = OWN_PARTS[0] in own
+        shift = own[OWN_PARTS[0]] if known else noise.unseen_shift
+        if len(np.unique(table.run_index)) > 1:
+            spread = sizes.own_spread if known else sizes.noise_spread
+            triangles = noise.triangles(table, prior.columns(table.X))
+            shift = shift_of_runs([triangles], sizes.shift * float(table.y.std()), spread)
+        return cls(features, found, prior, noise, shift)
 
     def told(self, table: TrainingTable) -> tuple[FloatArray, FloatArray]:
         """Information and image of averages of features in the prior's columns."""
-        columns, target = self.found.told(table, self.prior.columns(table.X), self.shift)
-        return columns.T @ columns, columns.T @ target
+        rows = shifted(self.noise.triangles(table, self.prior.columns(table.X)), self.shift)
+        return rows[:, :-1].T @ rows[:, :-1], rows[:, :-1].T @ rows[:, -1]
 
     def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> FloatArray:
         """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's."""
@@ -68,8 +101,9 @@ class DrawnMember(SharedMember):
 class SharedModel(MixedEffectsModel):
     """A unit's drift by a mixed-effects model whose shared part is drawn to its fleet's.
 
-    The prior of the shared part's coefficients is how they are spread over the fleet's units; those of the
-    sizes of runs' own parts have the fleet's sizes as medians.
+    The prior of the shared part's coefficients is how they are spread over the fleet's units. What the unit's
+    rows tell counts their slow noise and a run's shift, and all of what comes of both is kept: no skill is
+    asked for beyond it, as the prior has drawn together what the rows do not tell.
 
     The trained box is the fleet's and the unit's own together: where the unit's runs did not go,
     the fleet's constants tell what to expect. An odd unit is left to its own runs, but for the sizes
@@ -88,6 +122,9 @@ class SharedModel(MixedEffectsModel):
         The fleet's box.
     own
         Sizes of runs' own parts [deg/h], as `fogml.fleet.constants.FleetConstants.own` has them.
+    noise
+        The fleet's noise, as `fogml.fleet.constants.FleetConstants.noise` has it: the unit's is taken to be
+        as slow, of a size that its own rows tell.
 
     Attributes
     ----------
@@ -104,18 +141,20 @@ class SharedModel(MixedEffectsModel):
         prior: dict[str, Any],
         box: dict[str, list[float]],
         own: Mapping[str, float] | None = None,
+        noise: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(features, kind="shared")
         self.prior = prior
         self.box = box
         self.own = dict(own or {})
+        self.noise = dict(noise or {})
 
     def fit(self, runs: Run | Sequence[Run]) -> Self:
         """Fit to training runs, as `FeatureModel.fit`."""
         super().fit(runs)
         if self._alone:
             return self
-        self.regressor_.covariance_ = self.skill_**2 * self._covariance
+        self.regressor_.covariance_ = self._covariance
         own = self.features_.box
         self.features_.set_box(
             {
@@ -131,7 +170,8 @@ class SharedModel(MixedEffectsModel):
 
     def _shared_part(self, features: Features, table: TrainingTable) -> tuple[SharedMember, LinearRegressor]:
         prior = Prior.from_dict(self.prior)
-        member = DrawnMember(features, self.fitted_, prior, self.own.get(OWN_PARTS[0], 0.0))
+        member = DrawnMember.of(features, self.fitted_, table, prior, self.own, self.noise)
+        self._member = member
         own = features.box
         levels = [atom.text for atom in features.atoms if atom.operator == "value"]
         covered = min((_span(own[name]) / _span(self.box[name]) for name in levels), default=1.0)
@@ -147,6 +187,9 @@ class SharedModel(MixedEffectsModel):
         self._covariance = regressor.covariance_
         return member, regressor
 
+    def _kept(self, parts: Sequence[LeftOut]) -> FloatArray:
+        return super()._kept(parts) if self._alone else np.ones(1)
+
     def _why_alone(self, covered: float) -> str:
         """Why the unit is left to its own runs, which cover so much of the fleet's temperatures."""
         if covered < COVERED:
@@ -159,13 +202,17 @@ class SharedModel(MixedEffectsModel):
         return ""
 
     def _fit_notes(self) -> list[str]:
-        notes = super()._fit_notes()
         if self._alone:
-            return [*notes, f"{self._alone}; it is left to its own runs"]
+            return [*super()._fit_notes(), f"{self._alone}; it is left to its own runs"]
+        noise = self._member.noise.model
+        told = (
+            f"noise of the averages: N {noise.N:.2g} deg/sqrt(h), B {noise.B:.2g} deg/h, "
+            f"K {noise.K:.2g} deg/h/sqrt(h), shift of a run {self._member.shift:.2g} deg/h"
+        )
         drawn = (
             "constants are drawn to the fleet's, and the trained box is the fleet's and the unit's together"
         )
-        return [*notes, drawn, *self._resting()]
+        return [told, drawn, *self._resting()]
 
     def _resting(self) -> list[str]:
         """What the card says of temperatures that the unit's own runs have not shown."""
@@ -205,13 +252,16 @@ def shared_model(
     """
     if isinstance(fleet, FleetConstants):
         prior = fleet.effects.prior(covariates or {}).as_dict()
-        return SharedModel(fleet.features, prior, fleet.box, fleet.own)
+        return SharedModel(fleet.features, prior, fleet.box, fleet.own, fleet.noise)
     try:
         features, prior, box = str(fleet["features"]), dict(fleet["prior"]), dict(fleet["box"])
         box = {str(name): [float(low), float(high)] for name, (low, high) in box.items()}
         sizes = fleet.get("own", {})
         own = {name: float(sizes[name]) for name in OWN_PARTS if name in sizes}
-    except (KeyError, TypeError, ValueError):
+        noise = {str(name): float(size) for name, size in dict(fleet.get("noise", {})).items()}
+        if noise:
+            NoiseModel(**noise)
+    except (KeyError, TypeError, ValueError, InputError):
         raise InputError(
             "the fleet's constants are not understood; was this fleet.json written whole?"
         ) from None
@@ -224,7 +274,7 @@ def shared_model(
         )
     if "covariates" in fleet:
         prior = CovariateEffects.from_dict(fleet["covariates"]).prior(covariates or {}).as_dict()
-    return SharedModel(features, prior, box, own)
+    return SharedModel(features, prior, box, own, noise)
 
 
 def _span(ends: Sequence[float]) -> float:

@@ -60,6 +60,7 @@ def fleet_json(outcomes: Sequence[Mapping[str, Any]], settings: Mapping[str, Any
             "prior": found.prior.as_dict(),
             "box": found.box,
             "own": found.own,
+            "noise": found.noise,
         }
         if found.effects.columns.names:
             values["shared"]["covariates"] = found.effects.as_dict()

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.linalg import cho_factor, cho_solve, cholesky
 from scipy.optimize import minimize
 
 from fogml.arrays import BoolArray, FloatArray
@@ -60,36 +60,6 @@ class MixedEffects:
         """Coefficients and intercept [deg/h] given other rows, with the sizes as they were found."""
         coef, intercept, _ = _posterior(table, self._scale, self._relative)
         return coef, intercept
-
-    def told(
-        self, table: TrainingTable, columns: FloatArray, shift: float = 0.0
-    ) -> tuple[FloatArray, FloatArray]:
-        """What rows tell of coefficients of `columns`: equations whose noise is of unit covariance.
-
-        Noise is all that does not compensate: a run's own parts and white noise, of the sizes found.
-
-        Parameters
-        ----------
-        table
-            Averages, n of them.
-        columns
-            Their columns, the constant one among them, shape (n, k + 1).
-        shift
-            Size of a run's own shift [deg/h] where there is one run, which can't tell it from the constant.
-
-        Returns
-        -------
-        Columns and targets of the equations, shapes (k + 1, k + 1) and (k + 1,).
-        """
-        sizes = np.array([self.sizes[name] for name in OWN_PARTS])
-        if len(np.unique(table.run_index)) == 1:
-            sizes[0] = shift
-        covariance = np.tensordot(sizes**2, _own_kernels(table), 1)
-        covariance[np.diag_indices_from(covariance)] += self.sizes["noise"] ** 2
-        triangle = cholesky(covariance, lower=True)
-        whitened = solve_triangular(triangle, np.column_stack([columns, table.y]), lower=True)
-        rotation, root = np.linalg.qr(whitened[:, :-1])
-        return root, rotation.T @ whitened[:, -1]
 
     def regressor(self) -> LinearRegressor:
         """The shared part as a linear regressor."""

@@ -8,12 +8,14 @@ from typing import ClassVar
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.features.atoms import HYSTERESIS_DEGC
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.signal import TIME_ON, held_by
 from fogml.models.box import moves_both_ways
 from fogml.models.combination import (
+    LeftOut,
     SharedMember,
     combined,
     left_out,
@@ -84,7 +86,7 @@ class MixedEffectsModel(FeatureModel):
         T = temperatures_of(table, features)
         member, shared = self._shared_part(features, columns)
         parts = left_out([member], features, table, left_out_parts(table, T))
-        weights = weights_of(parts, 1, self._both_ways)
+        weights = self._kept(parts)
         self.skill_ = float(weights[0])
         mean = float(table.y.mean())
         _, self.regressor_ = combined([(features, shared)], weights, mean)
@@ -98,6 +100,10 @@ class MixedEffectsModel(FeatureModel):
     def _shared_part(self, features: Features, table: TrainingTable) -> tuple[SharedMember, LinearRegressor]:
         """What compensates, to be refitted and as fitted to averages of features."""
         return SharedMember(features, self.fitted_), self.fitted_.regressor()
+
+    def _kept(self, parts: Sequence[LeftOut]) -> FloatArray:
+        """Share of the shared part that is kept, shape (1,)."""
+        return weights_of(parts, 1, self._both_ways)
 
     def _interval(self, rows: Sequence[RunRows]) -> Intervals:
         return self._found

@@ -35,6 +35,9 @@ class Prior:
         Of the k columns, in their units, shape (k,).
     units
         Units that mean and covariance are estimated from; infinite where they are known.
+    wider
+        Factors by which standard deviations of a next unit are wider than `covariance` says, as few units, or
+        ones seen through noise, tell that badly; shape (k + 1,), none where they are known.
     """
 
     mean: FloatArray
@@ -42,6 +45,12 @@ class Prior:
     shift: FloatArray
     scale: FloatArray
     units: float = float("inf")
+    wider: FloatArray | None = None
+
+    @property
+    def of_a_next(self) -> FloatArray:
+        """Covariance of a next unit's coefficients, shape (k + 1, k + 1)."""
+        return self.covariance if self.wider is None else self.covariance * np.outer(self.wider, self.wider)
 
     def columns(self, X: FloatArray) -> FloatArray:
         """The columns of rows of features, shape (n, k + 1)."""
@@ -55,7 +64,7 @@ class Prior:
 
     def as_dict(self) -> dict[str, Any]:
         """The prior as JSON-ready values."""
-        values = {key: np.asarray(value).tolist() for key, value in vars(self).items()}
+        values = {key: np.asarray(value).tolist() for key, value in vars(self).items() if value is not None}
         return {**values, "units": self.units if np.isfinite(self.units) else None}
 
     @classmethod
@@ -79,9 +88,12 @@ class Prior:
             if not np.all(arrays["scale"]):
                 raise ValueError("a scale is 0")
             np.linalg.cholesky(arrays["covariance"])
+            wider = None if saved.wider is None else np.array(saved.wider, dtype=np.float64)
+            if wider is not None and (wider.shape != (width,) or not np.all(wider > 0.0)):
+                raise ValueError(f"{width} positive factors 'wider' were expected")
         except (ValueError, InputError, np.linalg.LinAlgError) as error:
             raise InputError(f"the fleet's prior is not understood ({error})") from None
-        return cls(**arrays, units=units)
+        return cls(**arrays, units=units, wider=wider)
 
 
 class _SavedPrior(Strict):
@@ -92,6 +104,7 @@ class _SavedPrior(Strict):
     shift: list[float]
     scale: list[float]
     units: float | None = Field(default=None, ge=1.0)
+    wider: list[float] | None = None
 
 
 def posterior(
@@ -112,7 +125,7 @@ def posterior(
     spreads
         Factors to average over.
     """
-    root, values, seen = _directions(information, image, prior)
+    root, values, seen = _directions(information, image, prior.mean, prior.of_a_next)
     gains, weights = [], []
     for spread in spreads:
         gain = spread / (1.0 + spread * values)
@@ -148,7 +161,7 @@ def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float
     prior
         What the fleet tells.
     """
-    _, values, seen = _directions(information, image, prior)
+    _, values, seen = _directions(information, image, prior.mean, prior.covariance)
     heard = values > _TOLD
     if not heard.any():
         return 0.0
@@ -170,7 +183,7 @@ def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float
 
 
 def _directions(
-    information: FloatArray, image: FloatArray, prior: Prior
+    information: FloatArray, image: FloatArray, mean: FloatArray, covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Directions in which rows and prior are both independent.
 
@@ -179,7 +192,7 @@ def _directions(
     The directions as columns, of unit variance in the prior; what the rows tell of each, its inverse
     variance; and that times their estimate's distance from the prior's mean.
     """
-    root = np.linalg.cholesky(prior.covariance)
+    root = np.linalg.cholesky(covariance)
     values, vectors = np.linalg.eigh(root.T @ information @ root)
     directions = root @ vectors
-    return directions, np.maximum(values, 0.0), directions.T @ (image - information @ prior.mean)
+    return directions, np.maximum(values, 0.0), directions.T @ (image - information @ mean)
