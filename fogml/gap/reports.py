@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from fogml.arrays import FloatArray
 from fogml.gap.field import Member
 from fogml.gap.frame import whitener_of
 from fogml.gap.how_far import Foretold
@@ -128,13 +127,8 @@ def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tupl
     for i, rows in enumerate(scene.runs):
         windows = averages(rows, found.setting.priors.reported.averaging_s)
         temperature = windows.of(rows.temperature)
-        gaps = {
-            "before": rows.gap,
-            "recalibrated": rows.gap - recalibrated.on(i),
-            "after": rows.gap - after.on(i),
-        }
-        gap: dict[str, FloatArray] = {name: windows.of(values) for name, values in gaps.items()}
-        recorded = windows.of(rows.recorded)
+        recorded, gap_before = windows.of(rows.recorded), windows.of(rows.gap)
+        gap_recalibrated, gap_after = (windows.of(rows.gap - told.on(i)) for told in (recalibrated, after))
         out.append(
             RunSeries(
                 run=rows.run.name,
@@ -145,12 +139,11 @@ def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tupl
                 rate_degc_min=rate(windows.time, temperature),
                 regime=rows.regime[windows.starts[windows.full]],
                 recorded=recorded,
-                replayed_before=recorded - gap["before"],
-                replayed_recalibrated=recorded - gap["recalibrated"],
-                replayed_after=recorded - gap["after"],
-                gap_before=gap["before"],
-                gap_recalibrated=gap["recalibrated"],
-                gap_after=gap["after"],
+                replayed_before=recorded - gap_before,
+                replayed_recalibrated=recorded - gap_recalibrated,
+                replayed_after=recorded - gap_after,
+                gap_recalibrated=gap_recalibrated,
+                gap_after=gap_after,
                 floor=float(floor_square(model, windows.time, windows.window_s)) ** 0.5,
                 gyro=rows.run.facts.unit,
                 axis=rows.run.facts.axis,

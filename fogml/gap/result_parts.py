@@ -277,9 +277,9 @@ class Counterfactual:
 class RunSeries:
     """What a page draws of a run: averages over `averaging_s`, all of shape (k,) [deg/h] unless said.
 
-    ``recorded`` is less the reference; ``gap_before``, ``gap_recalibrated`` and ``gap_after`` are
-    recorded less replayed; ``rate_degc_min`` tells up and down apart. ``gyro`` and ``axis`` name the
-    unit, ``note`` is what the run's facts say of it.
+    ``recorded`` is less the reference; ``gap_recalibrated`` and ``gap_after`` are recorded less replayed;
+    ``rate_degc_min`` tells up and down apart. ``gyro`` and ``axis`` name the unit, ``note`` is what the run's
+    facts say of it.
     """
 
     run: str
@@ -293,7 +293,6 @@ class RunSeries:
     replayed_before: FloatArray
     replayed_recalibrated: FloatArray
     replayed_after: FloatArray
-    gap_before: FloatArray
     gap_recalibrated: FloatArray
     gap_after: FloatArray
     floor: float

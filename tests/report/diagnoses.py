@@ -55,7 +55,6 @@ def series(run: str, role: str = "fit", *, n: int = 240, left: float = 0.0, note
         replayed_before=np.zeros(n),
         replayed_recalibrated=recorded - loop - noise,
         replayed_after=recorded - left * loop - noise,
-        gap_before=recorded,
         gap_recalibrated=loop + noise,
         gap_after=left * loop + noise,
         floor=FLOOR,
