@@ -179,13 +179,11 @@ def _ratios(values: Mapping[str, Any]) -> Drawing:
         mode="markers",
         name="all, with 95 % interval",
         marker={"symbol": "line-ns-open", "size": 16, "color": style.BLACK, "line": {"width": 3}},
-        error_x={
-            "type": "data",
-            "symmetric": False,
-            "array": [(t["high"] or t["value"]) - t["value"] for t in told.values()],
-            "arrayminus": [t["value"] - (t["low"] or t["value"]) for t in told.values()],
-            "color": style.BLACK,
-        },
+        error_x=style.error_bars(
+            [t["value"] for t in told.values()],
+            [(t["low"] or t["value"], t["high"] or t["value"]) for t in told.values()],
+            color=style.BLACK,
+        ),
     )
     figure.add_vline(x=1.0, line=style.FLOOR_LINE)
     ends = [v for t in told.values() for v in (t["low"], t["high"]) if v]

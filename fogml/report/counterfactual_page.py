@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from fogml.escaping import script_data
 from fogml.gap.result import Diagnosis
@@ -106,9 +105,7 @@ def _drawing(run: Counterfactual) -> Drawing:
     """Temperature, recorded with replayed, and the gap, as the sliders begin."""
     hours = (run.time_s - run.time_s[0]) / 3600.0
     replayed = run.replayed + sum(c.values for c in run.courses if c.acts)
-    figure = make_subplots(
-        rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.7, 1.4, 1.2]
-    )
+    figure = style.stacked([0.7, 1.4, 1.2], 0.05)
     lines = (
         (1, run.temperature_degc, "temperature", {"color": style.BLUE, "width": 1.6}),
         (2, run.recorded, "recorded", {"color": style.BEFORE, "width": 1.3}),

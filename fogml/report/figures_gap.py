@@ -77,13 +77,7 @@ def run_in_time(series: RunSeries, segments: Sequence[GapSegment], named: bool) 
     gaps = gap_starts(series.time_s) if len(time) > 2 else np.empty(0, dtype=np.intp)
     panels = ["temperature", "output", "recalibrated", *(["after"] if named else [])]
     heights = {"temperature": 0.75, "output": 1.3, "recalibrated": 1.15, "after": 1.15}
-    figure = make_subplots(
-        rows=len(panels),
-        cols=1,
-        shared_xaxes=True,
-        vertical_spacing=0.04,
-        row_heights=[heights[panel] for panel in panels],
-    )
+    figure = style.stacked([heights[panel] for panel in panels], 0.04)
 
     def line(panel: str, values: FloatArray, name: str, **looks: Any) -> None:
         x, y = drawn(time, values, gaps=gaps)

@@ -40,15 +40,8 @@ def _points(
         rows = [i for i, flag in enumerate(clear) if flag is wanted]
         if not rows:
             continue
-        value = x if horizontal else y
-        spread = {
-            "type": "data",
-            "symmetric": False,
-            "array": [max(bounds[i][1] - float(value[i]), 0.0) for i in rows],
-            "arrayminus": [max(float(value[i]) - bounds[i][0], 0.0) for i in rows],
-            "thickness": 1.6,
-            "width": 5,
-        }
+        value = [float((x if horizontal else y)[i]) for i in rows]
+        spread = style.error_bars(value, [bounds[i] for i in rows], thickness=1.6, width=5)
         colour = style.MODEL if wanted else style.GREY
         traces.append(
             go.Scatter(

@@ -44,13 +44,7 @@ def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = Non
     gaps = gap_starts(series.time)
     panels = ["temperature", "drift", "left"] if has_temperature(series) else ["drift", "left"]
     heights = {"temperature": 1.0, "drift": 1.5, "left": 1.5}
-    figure = make_subplots(
-        rows=len(panels),
-        cols=1,
-        shared_xaxes=True,
-        vertical_spacing=0.045,
-        row_heights=[heights[panel] for panel in panels],
-    )
+    figure = style.stacked([heights[panel] for panel in panels], 0.045)
 
     def line(panel: str, values: FloatArray, name: str, **looks: Any) -> None:
         x, y = drawn(time, values, gaps=gaps)

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.page import Drawing
@@ -23,13 +22,7 @@ def programme_drawing(run: Mapping[str, Any]) -> Drawing:
     turned = any(profile["table_rate"]["value"])
     switched = [what for what in (*_SWITCHES, "yaw") if what in profile]
     rows = ["temperature", *(["table"] if turned else []), *(["switches"] if switched else [])]
-    figure = make_subplots(
-        rows=len(rows),
-        cols=1,
-        shared_xaxes=True,
-        vertical_spacing=0.05,
-        row_heights=[2.0, *[1.0] * (len(rows) - 1)],
-    )
+    figure = style.stacked([2.0, *[1.0] * (len(rows) - 1)], 0.05)
     total_s = 3600.0 * run["hours"]
     per_unit, unit = time_unit(total_s)
     set_point, coil = profile["set_point"], profile["coil"]

@@ -272,15 +272,7 @@ def line_figure(line: Mapping[str, Any]) -> Drawing:
             mode="markers",
             name=words,
             marker={"size": 9, "color": colour, "symbol": symbol},
-            error_x={
-                "type": "data",
-                "symmetric": False,
-                "array": [max(high - m, 0.0) for m, (_, high) in zip(middle, ends, strict=True)],
-                "arrayminus": [max(m - low, 0.0) for m, (low, _) in zip(middle, ends, strict=True)],
-                "thickness": 1,
-                "width": 3,
-                "color": colour,
-            },
+            error_x=style.error_bars(middle, ends, thickness=1, width=3, color=colour),
         )
     figure.update_xaxes(title_text="share [%]", range=[0, 102])
     style.styled(figure, 130 + 34 * len(names))

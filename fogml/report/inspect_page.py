@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.report import style
@@ -200,13 +199,7 @@ def recording(run: Run) -> Drawing:
     rows += ["temperature"] if run.temperature_columns else []
     rows += ["change"] if rates else []
     rows += ["rate"] if np.any(run.rate) else []
-    figure = make_subplots(
-        rows=len(rows),
-        cols=1,
-        shared_xaxes=True,
-        vertical_spacing=0.035,
-        row_heights=[1.6, *[1.2] * (len(rows) - 1)],
-    )
+    figure = style.stacked([1.6, *[1.2] * (len(rows) - 1)], 0.035)
     per_unit, unit = time_unit(run.span_s)
     time = large.each(lambda seconds: seconds / per_unit, run.time)
     _output(figure, run, time, per_unit)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
@@ -134,7 +133,7 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def slopes_over_tilts(values: Mapping[str, Any]) -> Drawing:
     """Slopes with the fitted curves above, what is left of them below."""
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.62, 0.38], vertical_spacing=0.08)
+    figure = style.stacked([0.62, 0.38], 0.08)
     largest = max(abs(s) for state in values["states"] for s in state["slopes"])
     left = 0.0
     for index, state in enumerate(values["states"]):

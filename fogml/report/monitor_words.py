@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from fogml.fleet.summary import label_of
 from fogml.intervals import Z90
@@ -104,7 +103,7 @@ _UNITS = {
 def run_figures(unit: Mapping[str, Any]) -> Drawing:
     """Every figure over the unit's age, with the changes and the runs that they were noticed with."""
     told = [name for name in FIGURE_WORDS if any(run[name] is not None for run in unit["runs"])]
-    figure = make_subplots(rows=len(told), cols=1, shared_xaxes=True, vertical_spacing=0.16 / len(told))
+    figure = style.stacked([1.0] * len(told), 0.16 / len(told))
     age = unit["age"]
     for row, name in enumerate(told, start=1):
         values = [shown_figure(run, name) for run in unit["runs"]]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
+from plotly.subplots import make_subplots
 
 from fogml.signals.drawn import gap_starts
 
@@ -112,6 +113,20 @@ def floor_in_legend() -> go.Scatter:
 def ring(size: int) -> dict[str, Any]:
     """The marker that sets one point off from others, of so many px."""
     return {"symbol": "circle-open", "size": size, "color": VERMILION, "line": {"width": 2.5}}
+
+
+def error_bars(middle: Sequence[float], ends: Sequence[Sequence[float]], **looks: Any) -> dict[str, Any]:
+    """Bars from the lower to the upper end of each interval about its middle; `looks` as plotly has them."""
+    reach = [(max(m - low, 0.0), max(high - m, 0.0)) for m, (low, high) in zip(middle, ends, strict=True)]
+    below, above = zip(*reach, strict=True) if reach else ((), ())
+    return {"type": "data", "symmetric": False, "array": above, "arrayminus": below, **looks}
+
+
+def stacked(heights: Sequence[float], spacing: float) -> go.Figure:
+    """A figure of panels one below the other over the same axis, by their heights to each other."""
+    return make_subplots(
+        rows=len(heights), cols=1, shared_xaxes=True, vertical_spacing=spacing, row_heights=list(heights)
+    )
 
 
 def styled(figure: go.Figure, height: int, **layout: Any) -> go.Figure:

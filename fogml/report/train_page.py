@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from plotly.subplots import make_subplots
 
 from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
@@ -196,7 +195,7 @@ def navigation_sections(costs: Mapping[str, Any]) -> list[NavigationSection]:
 
 def navigation_figure(run: Mapping[str, Any], latitude_deg: float) -> Drawing:
     """Position and heading of a navigator at rest, driven by the drift before and after compensation."""
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.08)
+    figure = style.stacked([1.0, 1.0], 0.08)
     hours = np.asarray(run["time_h"])
     last: dict[str, float] = {}
     for when, colour, dash in (("before", style.BEFORE, "dot"), ("after", style.AFTER, "solid")):
