@@ -20,14 +20,6 @@ PAGES = {
 }
 """Page of each command in an axis' folder."""
 
-_KICKERS = {
-    "train": "Drift models, one an axis, judged on other runs",
-    "compare": "Models compared, axis by axis",
-    "inspect": "What is in the runs, axis by axis",
-    "noise": "Noise, axis by axis",
-    "lab acceptance": "Acceptance reports, axis by axis",
-}
-
 
 def axes_page(values: Mapping[str, Any], links: Mapping[str, str]) -> str:
     """The self-contained HTML page of what a command told of each axis.
@@ -40,13 +32,13 @@ def axes_page(values: Mapping[str, Any], links: Mapping[str, str]) -> str:
         Axis to the address of its page.
     """
     command, axes = values["command"], values["axes"]
-    headings, row = _TABLES[command]
+    kicker, headings, row = _SHOWN[command]
     table = Table(columns_of(f"Axis | {headings}"), ((axis, *row(told)) for axis, told in axes.items()))
     return render(
         "axes.html",
         title=f"fogml {command} – axes {', '.join(axes)}",
         name=_name(axes),
-        kicker=_KICKERS[command],
+        kicker=kicker,
         links=[(axis, links[axis], _mark(told)) for axis, told in axes.items()],
         table=table,
     )
@@ -132,34 +124,34 @@ def _acceptance(told: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-_TABLES: dict[str, tuple[str, Callable[[Mapping[str, Any]], tuple[str, ...]]]] = {
+_SHOWN: dict[str, tuple[str, str, Callable[[Mapping[str, Any]], tuple[str, ...]]]] = {
     "train": (
-        (
-            "Model | >Rms before [deg/h] | >Rms after [deg/h] | >Bias stability after [deg/h] | "
-            ">Noise floor [deg/h] | Of | Why"
-        ),
+        "Drift models, one an axis, judged on other runs",
+        "Model | >Rms before [deg/h] | >Rms after [deg/h] | >Bias stability after [deg/h] | "
+        ">Noise floor [deg/h] | Of | Why",
         _train,
     ),
     "compare": (
-        (
-            ">Rms before [deg/h] | >Rms, auto [deg/h] | Least on the test runs | >Its rms [deg/h] | "
-            ">Noise floor [deg/h]"
-        ),
+        "Models compared, axis by axis",
+        ">Rms before [deg/h] | >Rms, auto [deg/h] | Least on the test runs | >Its rms [deg/h] | "
+        ">Noise floor [deg/h]",
         _compare,
     ),
     "inspect": (
+        "What is in the runs, axis by axis",
         ">Rows | >Span | >Mean [deg/h or counts] | >Standard deviation [deg/h or counts] | Noticed",
         _inspect,
     ),
     "noise": (
-        (
-            ">Q [µrad] | >N [deg/√h] | >B [deg/h] | >K [deg/h/√h] | >R [deg/h/h] | "
-            ">Least deviation [deg/h] | >at [s]"
-        ),
+        "Noise, axis by axis",
+        ">Q [µrad] | >N [deg/√h] | >B [deg/h] | >K [deg/h/√h] | >R [deg/h/h] | "
+        ">Least deviation [deg/h] | >at [s]",
         _noise,
     ),
     "lab acceptance": (
+        "Acceptance reports, axis by axis",
         ">Tested | >Limits met | Missed | Why",
         _acceptance,
     ),
 }
+"""Of each command: what stands above the heading, and the table's columns and rows."""

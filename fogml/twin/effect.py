@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -23,17 +23,7 @@ SET_UP = ("rate", "angle", "earth", "powered_on", "facts", "output", "slopes")
 With the angle goes the rate, which tells its whole turns.
 """
 Stage = Literal["thermal", "rig", "bias", "scale_factor", "loop", "readout", "sensor", "logger", "noise"]
-STAGES: tuple[Stage, ...] = (
-    "thermal",
-    "rig",
-    "bias",
-    "scale_factor",
-    "loop",
-    "readout",
-    "sensor",
-    "logger",
-    "noise",
-)
+STAGES: tuple[Stage, ...] = get_args(Stage)
 
 
 class Effect(ABC):
