@@ -13,6 +13,7 @@ from experiments.lab_uncertainty import (
     certificates,
     fleets,
     joint,
+    lines,
     models,
     monitor,
     north,
@@ -96,6 +97,12 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         "Coefficients and prediction intervals of the model of a next unit, shared among ten fleets a case, "
         "and constants of these fleets' own units, of cycles of 7 h, in the columns of `fleet.json`; units' "
         "constants are normal. Units that are left to their own runs are not counted.",
+    ),
+    (
+        "A line of units (`fleet`)",
+        lines,
+        200,
+        "Shares and constants of units drawn at random; told of a fleet in which no unit is odd.",
     ),
     (
         "Alarms (`monitor`)",

@@ -26,7 +26,7 @@ from fogml.models.generalised_least_squares import runs_noise, shift_of_runs, sh
 from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
 from fogml.models.mixed_effects_basis import SizePriors
 from fogml.models.mixed_effects_model import averages_of, composed
-from fogml.models.prior import Prior
+from fogml.models.prior import Prior, rarity
 from fogml.models.table import run_rows
 from fogml.runs.run import Run
 from fogml.signals.distributions import chi2_ppf
@@ -189,6 +189,9 @@ class FleetConstants:
     values, errors
         Constant and coefficients of each unit in the prior's columns, drawn to the fleet where the
         unit's runs tell little, and their standard errors [deg/h], shapes (u, k + 1).
+    probabilities
+        Probability that a unit like the fleet would lie so far out or farther, its rows' noise counted, shape
+        (u,).
     distances
         How far each unit lies from the fleet, or from what it says of units with such covariates: Mahalanobis
         distance over the root of k + 1, shape (u,).
@@ -207,6 +210,7 @@ class FleetConstants:
     values: FloatArray
     errors: FloatArray
     distances: FloatArray
+    probabilities: FloatArray
     box: dict[str, list[float]]
     own: dict[str, float]
     noise: dict[str, float]
@@ -283,8 +287,13 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
         for name in units[0].box
     }
     distances = np.sqrt(distances / width)
+    probabilities = np.array(
+        [rarity(*one, effects.prior(unit.covariates)) for one, unit in zip(seen, units, strict=True)]
+    )
     noise = {name: float(np.sqrt(np.mean([unit.noise[name] ** 2 for unit in units]))) for name in _NOISE}
-    return FleetConstants(units[0].features, prior, effects, means, errors, distances, box, own, noise)
+    return FleetConstants(
+        units[0].features, prior, effects, means, errors, distances, probabilities, box, own, noise
+    )
 
 
 def _of_normal(width: int) -> float:

@@ -12,7 +12,14 @@ from pydantic import Field
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.fleet.shares import apart, bayes_factor, discoveries, prevalence, probability_of_difference
+from fogml.fleet.shares import (
+    apart,
+    bayes_factor,
+    discoveries,
+    prevalence,
+    probability_of_difference,
+    share_interval,
+)
 from fogml.gap.result import NAMED
 from fogml.gap.settings import Priors
 from fogml.signals.random_effects import random_effects
@@ -36,15 +43,12 @@ class LineRules:
     before
         Probability before the data that a unit has a given cause, as a diagnosis takes it: one of the
         catalogue's 60 that runs can show.
-    resamples
-        Lines drawn from the units for an interval: its ends are told to a tenth of its width.
     """
 
     false_share: float = 0.05
     shared: float = 0.95
     rare: float = 0.1
     before: float = 1.0 / 60.0
-    resamples: int = 400
 
 
 RULES = LineRules()
@@ -113,7 +117,7 @@ def _told(item: Any) -> bool:
 
 
 def line_diagnosis(
-    labels: Sequence[str], told: Sequence[Mapping[str, Any]], seed: int = 0, rules: LineRules = RULES
+    labels: Sequence[str], told: Sequence[Mapping[str, Any]], rules: LineRules = RULES
 ) -> dict[str, Any]:
     """What n units' diagnoses tell together, JSON-ready.
 
@@ -123,8 +127,6 @@ def line_diagnosis(
         Serial number and axis of each.
     told
         As `unit_diagnosis` gives them.
-    seed
-        Of the intervals' resampling.
     rules
         When a cause is shared or rare, and how often a unit may be told apart falsely.
 
@@ -135,9 +137,7 @@ def line_diagnosis(
     """
     units = [_read(label, one) for label, one in zip(labels, told, strict=True)]
     effects = sorted({cause.effect for unit in units for cause in unit.causes})
-    rng = np.random.default_rng(seed)
-    draws = rng.integers(len(units), size=(rules.resamples, len(units)))
-    causes = [_cause(effect, labels, units, draws, rules) for effect in effects]
+    causes = [_cause(effect, labels, units, rules) for effect in effects]
     causes.sort(key=lambda one: -one["energy_share"])
     unknown = prevalence([bayes_factor(unit.unknown, Priors.unknown) for unit in units])
     return {
@@ -171,7 +171,7 @@ def _factor(unit: UnitDiagnosis, effect: str, rules: LineRules) -> float:
 
 
 def _cause(
-    effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], draws: Any, rules: LineRules
+    effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], rules: LineRules
 ) -> dict[str, Any]:
     """One cause on the line."""
     # Units whose runs could not show it say nothing on how common it is.
@@ -183,9 +183,6 @@ def _cause(
     line = random_effects([c.amplitude for _, c in sure], [c.se for _, c in sure]) if sure else None
     energy = np.array([_energy(unit, effect) for unit in units])
     gap = np.array([unit.gap_square for unit in units])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        shares = energy[draws].sum(axis=1) / gap[draws].sum(axis=1)
-    low, high = np.nanquantile(np.where(np.isfinite(shares), shares, 0.0), (0.05, 0.95))
     return {
         "effect": effect,
         "members": sorted({member for _, cause in named for member in cause.members}),
@@ -200,7 +197,7 @@ def _cause(
         "between_units": None if line is None or np.isnan(line.between) else line.between,
         "unit": by_size[0][1].unit,
         "energy_share": float(energy.sum() / gap.sum()) if gap.sum() > 0.0 else 0.0,
-        "energy_share_ci90": [float(low), float(high)],
+        "energy_share_ci90": list(share_interval(energy, gap)),
         "gap_rms_without": _rms(gap - energy),
         "depends_on": _depends(effect, showing, rules),
     }

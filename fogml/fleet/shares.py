@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray
-from fogml.signals.distributions import student_sf
+from fogml.intervals import TAILS
+from fogml.signals.distributions import student_ppf, student_sf
 from fogml.signals.random_effects import random_effects
 
 _STEPS = 4000
@@ -61,6 +62,29 @@ def probability_of_difference(groups: Sequence[ArrayLike]) -> float:
     apart = sum(_log_evidence(group) for group in groups)
     together = _log_evidence(np.concatenate([np.asarray(group) for group in groups]))
     return float(1.0 / (1.0 + np.exp(np.clip(together - apart, -700.0, 700.0))))
+
+
+def share_interval(parts: ArrayLike, wholes: ArrayLike) -> tuple[float, float]:
+    """90 % interval of the share that parts make of wholes on a line, from those of n units.
+
+    By Student's t about the logit, its error by leaving each unit out in turn (a jackknife: R. G. Miller,
+    Biometrika 61 (1974) 1): few units whose wholes differ tell less than resampling them shows. Its lower end
+    is 0 where without one unit nothing is left of the parts; one unit tells nothing.
+    """
+    part, whole = np.asarray(parts, dtype=np.float64), np.asarray(wholes, dtype=np.float64)
+    count, total = len(part), float(whole.sum())
+    share = float(part.sum()) / total if total > 0.0 else 0.0
+    without = whole.sum() - whole
+    if count < 2 or np.any(without <= 0.0):
+        return 0.0, 1.0
+    if not 0.0 < share < 1.0:
+        return share, share
+    others = (part.sum() - part) / without
+    error = float(np.sqrt((count - 1.0) / count * np.sum((others - others.mean()) ** 2)))
+    reach = float(student_ppf(TAILS[1], count - 1)) * error / (share * (1.0 - share))
+    middle = np.log(share / (1.0 - share))
+    low, high = 1.0 / (1.0 + np.exp(-(middle + np.clip([-reach, reach], -700.0, 700.0))))
+    return float(low) if others.min() > 0.0 else 0.0, float(high)
 
 
 def _log_likelihood(factors: ArrayLike) -> FloatArray:

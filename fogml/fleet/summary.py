@@ -11,14 +11,14 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.fleet.constants import LEAST_UNITS, FleetConstants, UnitConstants, fleet_constants
-from fogml.fleet.diagnosis import line_diagnosis
+from fogml.fleet.diagnosis import RULES, line_diagnosis
+from fogml.fleet.shares import discoveries
 from fogml.fleet.tasks import DONE
 from fogml.intervals import SIGMA_PER_MEDIAN
 
 FLEET_SCHEMA = "fogml.fleet/1"
 _OUTLYING = 3.5
 # Robust standard deviations (B. Iglewicz & D. Hoaglin, How to Detect and Handle Outliers, 1993).
-_FAR = 2.0
 _OUTSIDE = 0.1
 _FLOORS = 3.0
 _LEAST_OUTLIER_UNITS = 5
@@ -50,8 +50,7 @@ def fleet_json(outcomes: Sequence[Mapping[str, Any]], settings: Mapping[str, Any
     told = [outcome for outcome in outcomes if outcome.get("found", {}).get("diagnosis")]
     if told:
         labels = [label_of(outcome) for outcome in told]
-        seed = int(settings.get("seed", 0))
-        values["diagnosis"] = line_diagnosis(labels, [one["found"]["diagnosis"] for one in told], seed)
+        values["diagnosis"] = line_diagnosis(labels, [one["found"]["diagnosis"] for one in told])
     if constants is not None:
         labels, found = constants
         values["constants"] = _constants_json(labels, found)
@@ -129,8 +128,9 @@ def _outliers(
     if constants is not None:
         labels, found = constants
         own = np.abs(found.values - found.prior.mean) / np.sqrt(np.diag(found.prior.covariance))
+        odd = discoveries(found.probabilities, RULES.false_share)
         for place, label in enumerate(labels):
-            if found.distances[place] > _FAR:
+            if odd[place]:
                 name = found.names[int(np.argmax(own[place]))]
                 what = "constant" if name == "1" else f"coefficient of {name}"
                 told.append(
@@ -214,6 +214,7 @@ def _constants_json(labels: Sequence[str], found: FleetConstants) -> dict[str, A
         "mean": (found.prior.mean / scale).tolist(),
         "std": (np.sqrt(np.diag(found.prior.covariance)) / scale).tolist(),
         "distance": found.distances.tolist(),
+        "probability": found.probabilities.tolist(),
         "at": dict(zip(found.names[1:], found.prior.shift.tolist(), strict=True)),
         "trends": trends,
     }

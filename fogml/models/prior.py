@@ -11,6 +11,7 @@ from pydantic import Field
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.signals.distributions import chi2_sf
 from fogml.strict import Strict, strictly
 
 _SPREADS = np.logspace(0.0, 8.0, 33)
@@ -161,12 +162,9 @@ def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float
     prior
         What the fleet tells.
     """
-    _, values, seen = _directions(information, image, prior.mean, prior.covariance)
-    heard = values > _TOLD
-    if not heard.any():
+    precise, squares = _heard(information, image, prior)
+    if not len(precise):
         return 0.0
-    precise = values[heard]
-    squares = seen[heard] ** 2 / (precise * (1.0 + precise))
     random = np.random.default_rng(0)
     unit = random.standard_normal((_DRAWS, len(precise)))
     noise = random.standard_normal((_DRAWS, len(precise)))
@@ -180,6 +178,31 @@ def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float
     # Of each figure the share of draws that are larger; then how rarely the lesser share is so small.
     ranks = np.argsort(np.argsort(-figures, axis=1), axis=1).min(axis=0)
     return float(np.mean(ranks[:-1] <= ranks[-1]))
+
+
+def rarity(information: FloatArray, image: FloatArray, prior: Prior) -> float:
+    """Probability that a unit of the fleet lies so far from its mean, or farther; 1 if its rows tell nothing.
+
+    By chi-square of the directions of which the rows tell something, the fleet's mean and covariance taken as
+    they are: for the units that these are estimated from.
+
+    Parameters
+    ----------
+    information, image
+        What the unit's rows tell of its constants, as in `posterior`.
+    prior
+        What the fleet tells.
+    """
+    precise, squares = _heard(information, image, prior)
+    return float(chi2_sf(squares.sum(), len(precise))) if len(precise) else 1.0
+
+
+def _heard(information: FloatArray, image: FloatArray, prior: Prior) -> tuple[FloatArray, FloatArray]:
+    """What rows tell of directions that they do tell, and the squares of their distances from the mean."""
+    _, values, seen = _directions(information, image, prior.mean, prior.covariance)
+    heard = values > _TOLD
+    precise = values[heard]
+    return precise, seen[heard] ** 2 / (precise * (1.0 + precise))
 
 
 def _directions(
