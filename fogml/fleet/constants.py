@@ -107,7 +107,7 @@ class UnitConstants:
         triangles = noise.triangles(table, np.column_stack([np.ones(len(table)), table.X / scale]))
         own = {name: found.sizes[name] for name in (OWN_PARTS[1:] if len(runs) > 1 else OWN_PARTS[2:])}
         if len(runs) > 1:
-            median = several.shift * float(table.y.std())
+            median = several.shift * (float(table.y.std()) or 1.0)
             own[OWN_PARTS[0]] = shift_of_runs([triangles], median, several.own_spread)
         box = {name: [float(low), float(high)] for name, (low, high) in form.box.items()}
         known = dict(covariates or {})

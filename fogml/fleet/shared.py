@@ -76,7 +76,7 @@ class DrawnMember(SharedMember):
         if len(np.unique(table.run_index)) > 1:
             spread = sizes.own_spread if known else sizes.noise_spread
             triangles = noise.triangles(table, prior.columns(table.X))
-            shift = shift_of_runs([triangles], sizes.shift * float(table.y.std()), spread)
+            shift = shift_of_runs([triangles], sizes.shift * (float(table.y.std()) or 1.0), spread)
         return cls(features, found, prior, noise, shift)
 
     def told(self, table: TrainingTable) -> tuple[FloatArray, FloatArray]:

@@ -188,6 +188,13 @@ def test_a_units_shift_from_run_to_run_is_learnt_from_units_of_several_runs():
     assert level < 0.7 < alone
 
 
+def test_outputs_that_stand_still_make_a_fleet():
+    still = [run.with_columns(gyro=np.ones(len(run.time))) for run in (unit_run(1, MEAN), unit_run(2, MEAN))]
+    fleet = fleet_constants([UnitConstants.of(still, FORM) for _ in range(3)])
+    assert fleet.own["own shift"] > 0.0
+    np.testing.assert_allclose(shared_model(fleet).fit(still).predict(still[0])[1000:], 1.0, atol=0.01)
+
+
 def test_an_odd_unit_is_left_to_its_own_run(fleet):
     odd = unit_run(200, draw(200, far=20.0))
     model = shared_model(fleet).fit(odd)
