@@ -189,6 +189,8 @@ class FleetConstants:
     values, errors
         Constant and coefficients of each unit in the prior's columns, drawn to the fleet where the
         unit's runs tell little, and their standard errors [deg/h], shapes (u, k + 1).
+    alone
+        The same by each unit's runs alone.
     probabilities
         Probability that a unit like the fleet would lie so far out or farther, its rows' noise counted, shape
         (u,).
@@ -209,6 +211,7 @@ class FleetConstants:
     effects: CovariateEffects
     values: FloatArray
     errors: FloatArray
+    alone: FloatArray
     distances: FloatArray
     probabilities: FloatArray
     box: dict[str, list[float]]
@@ -291,8 +294,9 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
         [rarity(*one, effects.prior(unit.covariates)) for one, unit in zip(seen, units, strict=True)]
     )
     noise = {name: float(np.sqrt(np.mean([unit.noise[name] ** 2 for unit in units]))) for name in _NOISE}
+    alone, _ = least_squares(seen)
     return FleetConstants(
-        units[0].features, prior, effects, means, errors, distances, probabilities, box, own, noise
+        units[0].features, prior, effects, means, errors, alone, distances, probabilities, box, own, noise
     )
 
 

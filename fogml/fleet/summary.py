@@ -195,7 +195,9 @@ def _constants_json(labels: Sequence[str], found: FleetConstants) -> dict[str, A
     trends = []
     for column, name in enumerate(found.names):
         values = found.values[:, column] / scale[column]
-        slope = float(theilslopes(values)[0]) if len(values) > 1 else 0.0
+        # What is drawn to one mean shows too little of a slope, but tells best whether there is one.
+        alone = found.alone[:, column] / scale[column]
+        slope = float(theilslopes(alone)[0]) if len(values) > 1 else 0.0
         probability = float(kendalltau(np.arange(len(values)), values).pvalue) if len(values) > 1 else 1.0
         trends.append(
             {

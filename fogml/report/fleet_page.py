@@ -137,7 +137,9 @@ def _trends(fleet: Mapping[str, Any]) -> Table:
         "Constant | >Fleet mean [deg/h per unit of the term] | >Between units, 1 σ | "
         ">Per serial number | >Probability by chance | Trend"
     )
-    return Table(columns, rows, "Slope by Theil and Sen, probability by Kendall's rank correlation.")
+    return Table(
+        columns, rows, "Slope of units' own runs by Theil and Sen, probability by Kendall's rank correlation."
+    )
 
 
 def _table(order: list[Mapping[str, Any]]) -> Table:

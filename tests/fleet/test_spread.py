@@ -8,6 +8,7 @@ import pytest
 from fogml.fleet.constants import UnitConstants, fleet_constants
 from fogml.fleet.shares import discoveries
 from fogml.fleet.spread import widening
+from fogml.fleet.summary import fleet_json
 
 
 def seen(constants: np.ndarray, error: float, rng: np.random.Generator) -> UnitConstants:
@@ -62,3 +63,25 @@ def test_few_fleets_name_an_odd_unit_where_there_is_none():
     # Five per cent of 30 are 1.5, three standard deviations more are 5.
     assert falsely <= 5
     assert found >= 28
+
+
+def test_a_trend_over_serial_numbers_is_as_steep_as_it_is():
+    """A constant that grows by 0.1 a unit, told worse than units differ: drawn values grew by half of it."""
+    rng = np.random.default_rng(8)
+    slopes = []
+    for _ in range(24):
+        constants = rng.normal(size=(24, 2)) + np.outer(0.1 * np.arange(24), [1.0, 0.0])
+        outcomes = [
+            {
+                "unit": f"F{place}",
+                "axis": "x",
+                "job": "train",
+                "folder": f"F{place}",
+                "status": "done",
+                "found": {"constants": seen(one, 1.5, rng).as_dict()},
+            }
+            for place, one in enumerate(constants)
+        ]
+        slopes.append(fleet_json(outcomes, {})["constants"]["trends"][0]["per_unit"])
+    # 24 slopes of a standard deviation of 0.053 each: 0.033 is three standard errors.
+    assert np.mean(slopes) == pytest.approx(0.1, abs=0.033)
