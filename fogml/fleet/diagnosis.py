@@ -194,6 +194,7 @@ def _cause(
         "shared": bool(common.over_half >= rules.shared),
         "amplitude": None if line is None else line.mean,
         "amplitude_se": None if line is None else line.se,
+        "amplitude_ci90": None if line is None else list(line.interval()),
         "between_units": None if line is None or np.isnan(line.between) else line.between,
         "unit": by_size[0][1].unit,
         "energy_share": float(energy.sum() / gap.sum()) if gap.sum() > 0.0 else 0.0,

@@ -232,7 +232,8 @@ def line_table(line: Mapping[str, Any]) -> Table:
         size = MISSING
         if cause["amplitude"] is not None:
             between = f", between units {number(cause['between_units'])}" if cause["between_units"] else ""
-            size = f"{number(cause['amplitude'])} ± {number(cause['amplitude_se'])} {cause['unit']}{between}"
+            low, high = (number(end) for end in cause["amplitude_ci90"])
+            size = f"{number(cause['amplitude'])} ({low} … {high}) {cause['unit']}{between}"
         common, energy = cause["prevalence_ci90"], cause["energy_share_ci90"]
         cells = (
             cause["effect"],
@@ -247,7 +248,7 @@ def line_table(line: Mapping[str, Any]) -> Table:
         rows.append(cells)
     columns = columns_of(
         "Cause | Shared | Units that have it [of those that could show it] | "
-        "Share of the line [90 %] | Size | Of the line's gap [90 %] | "
+        "Share of the line [90 %] | Size [90 %] | Of the line's gap [90 %] | "
         ">Gap without it [deg/h rms] | Place"
     )
     others = len(line["causes"]) - len(rows)

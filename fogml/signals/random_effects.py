@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
 from fogml.intervals import LEVEL
-from fogml.signals.distributions import student_ppf
+from fogml.signals.distributions import normal_ppf, student_ppf
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,12 @@ class RandomEffects:
     se: float
     between: float
     count: int
+
+    def interval(self, level: float = 0.9) -> tuple[float, float]:
+        """Where the mean lies with a probability; by Student's t of as many units, of one by its error."""
+        tail = 0.5 + 0.5 * level
+        reach = float(student_ppf(tail, self.count - 1) if self.count > 1 else normal_ppf(tail)) * self.se
+        return self.mean - reach, self.mean + reach
 
     def next_value(self, level: float = LEVEL) -> tuple[float, float]:
         """Where the next unit's true value lies with a probability; by Student's t of as many units."""

@@ -43,3 +43,22 @@ def test_the_next_unit_lies_where_it_is_said_to():
         low, high = random_effects(units[:6] + 0.2 * rng.normal(size=6), np.full(6, 0.2)).next_value()
         inside += low <= units[6] <= high
     assert 0.85 < inside / 400 < 0.96
+
+
+@pytest.mark.parametrize("count", [3, 10])
+def test_the_mean_of_few_units_lies_within_its_interval(count: int):
+    """As units differ: by 1.645 standard errors 74 % of three units' means did."""
+    rng = np.random.default_rng(count)
+    held = []
+    for _ in range(400):
+        errors = rng.uniform(0.3, 1.0, size=count)
+        low, high = random_effects(
+            rng.normal(size=count) + errors * rng.normal(size=count), errors
+        ).interval()
+        held.append(low <= 0.0 <= high)
+    # Three standard errors of 400 are 0.045.
+    assert np.mean(held) == pytest.approx(0.92, abs=0.05)
+
+
+def test_one_unit_s_interval_is_that_of_its_error():
+    assert random_effects([1.0], [0.2]).interval() == pytest.approx((1.0 - 0.32897, 1.0 + 0.32897), abs=1e-5)
