@@ -47,12 +47,15 @@ class LeftOut:
         Predictions of m members and the output, shapes (n, m) and (n,).
     excess
         Distance of the rows from the box of those fitted to, as a share of its span, shape (n,).
+    fold
+        Indices of the rows fitted to, and of the part's.
     """
 
     kind: str
     predicted: FloatArray
     told: FloatArray
     excess: FloatArray
+    fold: Fold
 
 
 class Member(Protocol):
@@ -153,7 +156,7 @@ def left_out(
             excess = np.maximum(excess, distance_outside(of_part, outside, own))
             columns = replace(rest, X=own.compose(of_rest))
             predicted.append(member.on(own, columns, own.compose(limited)) - mean)
-        found.append(LeftOut(kind, np.column_stack(predicted), part.y - mean, excess))
+        found.append(LeftOut(kind, np.column_stack(predicted), part.y - mean, excess, (fitted, held)))
     return found
 
 

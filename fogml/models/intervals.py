@@ -4,20 +4,21 @@ Training rows are averaged over ``averaging_s``, cut into folds of time (whole r
 are three or more: `half_widths_of_runs`), and for each fold the model is fitted to the others. Of
 folds of time the half-width at a level p is the conformal quantile of the n absolute residuals: the
 ceil((n + 1) p)-th smallest (Vovk, Gammerman & Shafer 2005; the cross-conformal form is
-Barber et al., "Predictive inference with the jackknife+", Ann. Statist. 49, 2021).
+Barber et al., "Predictive inference with the jackknife+", Ann. Statist. 49, 2021), widened by the slow
+noise that parts left out share with the rows about them (`fogml.models.unseen_noise`).
 
 What it covers: averages over ``averaging_s`` of the gyro's error on runs like the training
 runs, noise of the averages included. So it is a little wide for the drift alone, and says
-nothing on single samples. What training runs don't show it can't hold: another ramp rate,
-another turn-on, ageing. Outside the trained box the half-width grows in proportion to the
-distance: twice as wide at one tenth of the box's span.
+nothing on single samples. What training runs don't show it can't hold: another turn-on, ageing.
+Outside the trained box the half-width grows in proportion to the distance: twice as wide at one tenth
+of the box's span.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s
+from fogml.models.unseen_noise import unseen_noises
 from fogml.signals.averages import AVERAGING_S
 from fogml.signals.distributions import normal_ppf, student_ppf
 from fogml.strict import CONTENT, strictly
@@ -188,8 +190,13 @@ def out_of_fold_intervals(
     folds, name = interval_folds(table, guard_s)
     if not folds:
         folds, name = time_folds(table), "time blocks"
-    residuals = [table.y[held] - predicted(table.take(fitted), table.take(held)) for fitted, held in folds]
+    told = np.full(len(table), table.y.mean())
+    for fitted, held in folds:
+        told[held] = predicted(table.take(fitted), table.take(held))
+    residuals = [table.y[held] - told[held] for _, held in folds]
     if name == WHOLE_RUNS:
         half = half_widths_of_runs(residuals)
         return Intervals(table.averaging_s, tuple(half.tolist()), len(table), name)
-    return intervals_from_residuals(np.concatenate(residuals), table.averaging_s, name)
+    found = intervals_from_residuals(np.concatenate(residuals), table.averaging_s, name)
+    (unseen,) = unseen_noises(table, told, [folds])
+    return replace(found, half_widths=tuple(unseen.widened(found.half_widths, LEVELS).tolist()))

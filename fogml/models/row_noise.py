@@ -214,7 +214,7 @@ def _sandwich(table: TrainingTable, noise: RowNoise, regressor: LinearRegressor)
     if regressor.fit_intercept:
         columns = np.column_stack((np.ones(len(columns)), columns))
     basis, root = np.linalg.qr(columns)
-    middle = np.einsum("s,sij->ij", noise.weights @ noise.squares, _shapes(basis, table, noise.step_s))
+    middle = np.einsum("s,sij->ij", noise.weights @ noise.squares, noise_products(basis, table, noise.step_s))
     penalty = np.full(columns.shape[1], np.sqrt(regressor.ridge_ * len(columns)))
     penalty[: columns.shape[1] - len(scale)] = 0.0
     gain = np.linalg.pinv(np.vstack((root, np.diag(penalty))), rcond=1e-12)[:, : len(root)]
@@ -228,7 +228,7 @@ def _sandwich(table: TrainingTable, noise: RowNoise, regressor: LinearRegressor)
     return np.asarray(gain @ middle @ gain.T)
 
 
-def _shapes(basis: FloatArray, table: TrainingTable, step_s: float) -> FloatArray:
+def noise_products(basis: FloatArray, table: TrainingTable, step_s: float) -> FloatArray:
     """``Q'CQ`` of white noise, flicker and a random walk of unit squares, runs apart, shape (3, k, k)."""
     found = np.zeros((3, basis.shape[1], basis.shape[1]))
     edges = np.flatnonzero(np.diff(table.run_index)) + 1

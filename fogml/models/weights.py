@@ -30,6 +30,7 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.models.combination import LEAST_WEIGHT, LeftOut
 from fogml.models.intervals import LEVELS, Intervals, half_widths_of_runs, quantiles_of_parts
 from fogml.models.table import TrainingTable
+from fogml.models.unseen_noise import Unseen, unseen_noises
 
 UNSEEN_SHIFT = 2.0**0.5
 """Widening where no run can be left out: how a run is shifted from the next is not seen in one, and is taken
@@ -138,8 +139,8 @@ def intervals_of(
 ) -> Intervals:
     """Half-widths from what is left on runs left out; of one run on its parts, widened.
 
-    Of several runs they are those of `half_widths_of_runs`. Of one it is the widest of the kinds of its parts
-    times `UNSEEN_SHIFT`.
+    Of several runs they are those of `half_widths_of_runs`. Of one it is the widest of the kinds of its
+    parts, each with the slow noise that it does not show, times `UNSEEN_SHIFT`.
 
     There errors are taken relative to how the half-width grows outside the box, as a half or a direction left
     out lies outside of the rest; runs left out count as they are.
@@ -159,7 +160,10 @@ def intervals_of(
     if runs:
         half = half_widths_of_runs([part.told - part.predicted @ weights for part in runs])
     else:
-        widest = [quantiles_of_parts(_lefts(parts, weights, kind), np.array(LEVELS)) for kind in kinds]
+        widest = [
+            unseen.widened(quantiles_of_parts(_lefts(parts, weights, kind), np.array(LEVELS)), LEVELS)
+            for kind, unseen in zip(kinds, _unseen(parts, weights, table, kinds), strict=True)
+        ]
         half = UNSEEN_SHIFT * np.max([np.zeros(len(LEVELS)), *widest], axis=0)
     if not both_ways or not parts:
         drift = float(table.y.std())
@@ -168,6 +172,20 @@ def intervals_of(
     told = f"{' and '.join(kinds)} left out" if kinds else "none"
     averaging_s, half_widths = float(table.averaging_s), tuple(half.tolist())
     return Intervals(averaging_s, half_widths, len(table), told, LEVELS, WIDENING_PER_SPAN)
+
+
+def _unseen(
+    parts: Sequence[LeftOut], weights: FloatArray, table: TrainingTable, kinds: Sequence[str]
+) -> list[Unseen]:
+    """Slow noise on another run that the parts of each kind do not show."""
+    if not kinds:
+        return []
+    predicted = np.full(len(table), table.y.mean())
+    for part in parts:
+        if part.kind == kinds[-1]:
+            _, held = part.fold
+            predicted[held] = table.y[held] - part.told + part.predicted @ weights
+    return unseen_noises(table, predicted, [[p.fold for p in parts if p.kind == kind] for kind in kinds])
 
 
 def _lefts(parts: Sequence[LeftOut], weights: FloatArray, kind: str) -> list[FloatArray]:
