@@ -104,7 +104,7 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
         shares.append(share_within(model, test))
     rows = [coverage(name, key, every) for key, every in told.items()]
     rows += _of_units([fleet_of(case, seed + number) for number in range(min(FLEETS, repeats))], name)
-    return [*rows, of_runs(name, "averages over 100 s on another run", shares)]
+    return [*rows, of_runs(name, "averages on another run", shares)]
 
 
 def _of_units(fleets: list[tuple[FleetConstants, list[FloatArray]]], name: str) -> list[dict[str, Any]]:
