@@ -41,13 +41,7 @@ class Unseen:
         places = 0.5 + np.array(levels) / 2.0
         shown = np.asarray(half_widths) / normal_ppf(places)
         scales = np.sqrt(shown[:, None] ** 2 + self.variances + np.finfo(float).tiny)
-        centres = np.zeros(len(self.variances))
-        return np.array(
-            [
-                students_ppf(place, self.weights, centres, scale, np.inf)
-                for place, scale in zip(places.tolist(), scales, strict=True)
-            ]
-        )
+        return np.asarray(students_ppf(places, self.weights, np.zeros(len(self.weights)), scales, np.inf))
 
 
 NONE = Unseen(np.zeros(1), np.ones(1))

@@ -64,20 +64,21 @@ def student_sf(value: ArrayLike, freedom: ArrayLike) -> Any:
 
 
 def students_ppf(
-    probability: float, weights: FloatArray, centres: FloatArray, scales: FloatArray, freedom: float
-) -> float:
+    probability: ArrayLike, weights: FloatArray, centres: FloatArray, scales: FloatArray, freedom: float
+) -> Any:
     """Value under which a mixture of Student's t about `centres` lies with a probability, by halving.
 
-    Weights, centres and scales, none of which is 0, are of shape (m,).
+    Weights and centres are of shape (m,), scales, none of which is 0, of the probability's shape and m.
     """
-    ends = centres + scales * student_ppf(probability, freedom)
-    low, high = float(ends.min()), float(ends.max())
-    while high - low > 1e-12 * max(abs(low), abs(high)):
+    asked = np.asarray(probability)
+    ends = centres + scales * student_ppf(asked, freedom)[..., None]
+    low, high = ends.min(axis=-1), ends.max(axis=-1)
+    while np.any(high - low > 1e-12 * np.maximum(np.abs(low), np.abs(high))):
         middle = 0.5 * (low + high)
-        if not low < middle < high:
+        if not np.any((low < middle) & (middle < high)):
             break
-        above = float(weights @ student_sf((middle - centres) / scales, freedom))
-        low, high = (low, middle) if above < 1.0 - probability else (middle, high)
+        beyond = student_sf((middle[..., None] - centres) / scales, freedom) @ weights < 1.0 - asked
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
     return 0.5 * (low + high)
 
 
