@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fogml.errors import InputError
-from fogml.lab.misalignment import TableMeasurements, _slopes, decouple
+from fogml.lab.misalignment import TableMeasurements, _cross_tilt_angle, _slopes, decouple
 from fogml.lab.misalignment_methods import compare_methods, relative_error_ppm
 from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
@@ -144,6 +146,19 @@ def test_a_fixture_tilted_across_is_seen() -> None:
     assert relative_error_ppm(found.K, 1.2345) == pytest.approx(-13.7, abs=0.02)
     blind = decouple(turns, cross_tilt=False)
     assert abs(blind.delta_x_deg - 5.0) > 1e-4
+
+
+@pytest.mark.parametrize(("error_deg", "told"), [(None, True), (0.9, True), (1.1, False)])
+def test_a_tilt_across_is_told_beside_a_misalignment_that_is(error_deg: float | None, told: bool) -> None:
+    """Constants of opposite states differ by 2 K sin(misalignment) f; five standard errors are asked."""
+    K, misalignment_deg, tilt_deg = 2.0, 5.0, 0.4
+    half = K * np.sin(np.radians(misalignment_deg)) * np.sin(np.radians(tilt_deg))
+    fits: Any = [SimpleNamespace(coefficients=(0.0, 0.0, constant)) for constant in (half, -half, 0.1, 0.1)]
+    covariance = None if error_deg is None else np.diag([0.0, 0.0, 0.0, error_deg**2])
+    values = np.array([K, 0.0, misalignment_deg, misalignment_deg])
+    found, notes = _cross_tilt_angle(fits, values, covariance)
+    assert found == (pytest.approx(tilt_deg, rel=1e-9) if told else None)
+    assert len(notes) == 1
 
 
 @settings(max_examples=40, deadline=None)

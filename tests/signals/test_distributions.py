@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from fogml import intervals
 from fogml.signals import distributions as own
 
 RANDOM = np.random.default_rng(0)
@@ -53,3 +54,11 @@ def test_a_mixture_of_students() -> None:
     assert own.students_ppf(0.95, np.ones(1), np.zeros(1), np.ones(1), 7.0) == pytest.approx(
         stats.t.ppf(0.95, 7)
     )
+
+
+def test_widths_of_intervals_are_those_of_the_normal_distribution():
+    for width, share in ((intervals.Z50, 0.5), (intervals.Z90, 0.9), (intervals.Z95, 0.95)):
+        assert width == pytest.approx(stats.norm.ppf(0.5 + share / 2.0), rel=1e-14)
+    assert intervals.LEVEL == 0.9 and pytest.approx((0.05, 0.95)) == intervals.TAILS
+    assert pytest.approx(intervals.Z50, rel=1e-4) == intervals.MEDIAN_SIZE
+    assert pytest.approx(1.0, rel=1e-4) == intervals.MEDIAN_SIZE * intervals.SIGMA_PER_MEDIAN
