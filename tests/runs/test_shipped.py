@@ -68,6 +68,8 @@ def test_thermal_cycle():
     assert again.temperature()[0] == pytest.approx(74.0, abs=0.05)
     assert up.span_s == pytest.approx(0.5057 * 3501)
     assert rejected_rows(down) == 5
+    # The first row, then those of no leg, counted from 1.
+    assert [f.row for f in down.findings if f.code == "rejected_rows"] == [1, 2]
 
 
 def test_cold_start_has_378_gaps():

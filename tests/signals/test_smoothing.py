@@ -30,6 +30,15 @@ def test_the_penalty_is_that_of_a_dense_smoother(noise: float) -> None:
         assert found.noise == pytest.approx(generalised_score(values, found.penalty)[1], rel=0.02)
 
 
+@pytest.mark.parametrize("share", [1.0, 0.05])
+def test_courses_are_those_of_a_dense_smoother_with_a_share_of_the_penalty(share: float) -> None:
+    values = np.sin(np.arange(80.0) / 6.0) + 0.1 * np.random.default_rng(1).standard_normal(80)
+    smooth, found = smoothed(values, share)
+    third = np.diff(np.eye(80), 3, axis=0)
+    expected = np.linalg.solve(np.eye(80) + share * found.penalty * third.T @ third, values)
+    np.testing.assert_allclose(smooth, expected, atol=1e-8)
+
+
 def test_a_difference_of_windows_is_that_of_their_means() -> None:
     """Of a parabola, and with what came before held at the first value."""
     time = np.arange(0.0, 200.0, 2.0)
