@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,8 +16,9 @@ from fogml.gap.result import HowFar
 from fogml.gap.result_parts import Where
 from fogml.report import gap_page
 from fogml.report.gap_page import MOST_RUNS_DRAWN
-from fogml.report.gap_tables import causes_table
+from fogml.report.gap_tables import causes_table, constants_table
 from fogml.report.gap_words import probability_words, unit_words, with_error
+from fogml.report.words import MISSING
 from fogml.twin.registry import effect, effects
 from tests.report.diagnoses import diagnosis, every_diagnosis, hysteresis, series
 from tests.report.pages import Page
@@ -257,3 +259,13 @@ def test_a_value_and_its_error_are_rounded_alike(value: float, se: float) -> Non
     first, second = (float(part) for part in told.split(" ± "))
     assert second == pytest.approx(se, rel=0.06)
     assert abs(first - value) <= 0.06 * se
+
+
+@pytest.mark.parametrize(
+    ("prior_sd", "se", "learnt"), [(0.5, 0.1, "80"), (2.0, 3.0, "0"), (0.0, 0.1, MISSING)]
+)
+def test_what_runs_taught_of_a_constant_is_by_how_much_its_prior_narrowed(prior_sd, se, learnt):
+    fields = {"name": "b0", "unit": "deg/h", "prior_mean": 0.0, "value": 0.3}
+    constant = SimpleNamespace(**fields, prior_sd=prior_sd, se=se)
+    (row,) = constants_table(SimpleNamespace(constants=[constant])).rows
+    assert str(row[-1]).startswith(learnt)
