@@ -25,7 +25,7 @@ class Data:
 @pytest.mark.parametrize("kind", [Model, Data])
 @pytest.mark.parametrize("size", [math.nan, math.inf, True, "1", None])
 def test_only_finite_numbers_are_numbers(kind, size):
-    with pytest.raises(InputError, match="key 'part.size'"):
+    with pytest.raises(InputError, match=r"key 'part\.size'"):
         strictly(kind, {"size": size}, "part")
 
 

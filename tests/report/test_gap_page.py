@@ -268,4 +268,4 @@ def test_what_runs_taught_of_a_constant_is_by_how_much_its_prior_narrowed(prior_
     fields = {"name": "b0", "unit": "deg/h", "prior_mean": 0.0, "value": 0.3}
     constant = SimpleNamespace(**fields, prior_sd=prior_sd, se=se)
     (row,) = constants_table(SimpleNamespace(constants=[constant])).rows
-    assert str(row[-1]).startswith(learnt)
+    assert str(row.cells[-1]).startswith(learnt)
