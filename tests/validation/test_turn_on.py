@@ -77,3 +77,10 @@ def test_a_band_that_no_run_answers_is_told():
     unknown = warming(powered_on=None)
     with pytest.raises(InputError, match="no run states when the gyro was switched on"):
         judge(KnownDrift().fit(unknown), unknown, unknown, turn_on_band=0.05)
+
+
+def test_an_average_at_power_on_counts():
+    """Of 8 averages, the first right at power-on, the second is settled: half of the way is in the band."""
+    time, values = 10.0 * np.arange(8), np.array([1.0, *np.zeros(7)])
+    assert turn_on_time(time, values, 0.0, 0.5, 10.0) == pytest.approx(5.0)
+    assert turn_on_time(time, values, 1.0, 0.5, 10.0) is None
