@@ -242,7 +242,8 @@ class SpectrumModel:
         told_by = np.diag(information) > _ROUNDED
         size = np.where(told_by, np.sqrt(np.maximum(np.diag(information), _ROUNDED)), np.inf)
         values, vectors = np.linalg.eigh(information / np.outer(size, size))
-        pull = (moments[:, -1] + scaled.T @ (weight * (told.power - density))) / size
+        apart = np.where(self.used, told.power - density, 0.0)
+        pull = (moments[:, -1] + scaled.T @ (weight * apart)) / size
         root = np.sqrt(np.maximum(values, _ROUNDED))
         return np.asarray(nnls(root[:, None] * vectors.T, vectors.T @ pull / root)[0] / size / norms)
 
