@@ -111,6 +111,12 @@ class SpectrumModel:
         self.used = np.ones(len(spectrum.power), dtype=np.bool_) if used is None else used
         self._single = len(spectrum.values)
         self._basis, self._back = spectrum.basis
+        low = self.used[: self._single]
+        if not low.all() and self._basis.shape[1]:
+            # Columns that lie in rows that are not used are told by none.
+            _, sizes, turned = np.linalg.svd(self._basis * low[:, None], full_matrices=False)
+            shown = turned[sizes**2 > _ROUNDED].T
+            self._basis, self._back = self._basis @ shown, self._back @ shown
         self._cycles = spectrum.frequency_hz * spectrum.sample_s
         # A filter that lets nothing of the whole spectrum pass is told from no other.
         self._lowest_corner = float(np.log(np.pi * np.min(self._cycles, initial=0.5)))
@@ -242,8 +248,7 @@ class SpectrumModel:
         told_by = np.diag(information) > _ROUNDED
         size = np.where(told_by, np.sqrt(np.maximum(np.diag(information), _ROUNDED)), np.inf)
         values, vectors = np.linalg.eigh(information / np.outer(size, size))
-        apart = np.where(self.used, told.power - density, 0.0)
-        pull = (moments[:, -1] + scaled.T @ (weight * apart)) / size
+        pull = (moments[:, -1] + scaled.T @ (weight * (told.power - density))) / size
         root = np.sqrt(np.maximum(values, _ROUNDED))
         return np.asarray(nnls(root[:, None] * vectors.T, vectors.T @ pull / root)[0] / size / norms)
 

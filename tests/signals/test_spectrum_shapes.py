@@ -72,3 +72,17 @@ def test_a_fit_beside_columns_is_where_a_simplex_ends(seed: int) -> None:
         for shift in (0.0, [0.0, 1.0, -1.0, 0.0])
     ]
     assert loss(fit.coefficients) < min(end.fun for end in ends) + 1e-5
+
+
+def test_a_column_that_lies_in_rows_that_are_not_used_has_no_say() -> None:
+    """A wave of one row: without that row it tells nothing, and nothing of it is to be told."""
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=2000) + np.cumsum(0.02 * rng.normal(size=2000))
+    wave = np.cos(np.pi * (np.arange(2000) + 0.5) / 2000.0 * 6)[:, None]
+    found = []
+    for columns in (wave, np.zeros((2000, 1))):
+        spectrum = spectrum_of([values], 1.0, [columns])
+        used = np.arange(len(spectrum.power)) != 5
+        assert len(spectrum.values) > 5
+        found.append(SpectrumModel(spectrum, SpectrumTerms(("N", "B", "K")), used=used).fit().coefficients)
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
