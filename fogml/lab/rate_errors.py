@@ -78,8 +78,6 @@ def spread_of(
     # Of a ratio without scatter nothing is off: a scale of 0 has no quantile.
     scales = np.maximum(sizes, 1e-12 * largest)
     middle = np.zeros(len(sizes))
-    inner, outer = (
-        students_ppf(0.5 * (1.0 + level), models.weights, middle, scales, models.freedom)
-        for level in (ONE_SIGMA, LEVEL)
-    )
+    places = 0.5 * (1.0 + np.array([ONE_SIGMA, LEVEL]))
+    inner, outer = students_ppf(places, models.weights, middle, scales, models.freedom).tolist()
     return Spread(inner / float(student_ppf(0.5 * (1.0 + ONE_SIGMA), models.freedom)), outer)

@@ -7,7 +7,7 @@ as a whole is added to these, whose column of the constant it moves along.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -20,10 +20,6 @@ from fogml.processes import one_thread
 from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import Ladder, NoiseModel, flicker_ladder
 from fogml.signals.whitening import Whitener
-
-_SIZES = 41
-_REACH = 4.0
-# Sizes that are weighed, and how far they go either way, in deviations of the prior's logarithm.
 
 
 @dataclass(frozen=True)
@@ -81,23 +77,23 @@ class RunsNoise:
         spread
             Standard deviation of the logarithm of the size, between one and others.
         """
-        places = np.linspace(-_REACH, _REACH, _SIZES)
-        sizes = np.exp(spread * places)
-        models = [NoiseModel(self.model.N, size * others.B, size * others.K) for size in sizes.tolist()]
         scale = np.where(np.ptp(table.X, axis=0) > 0.0, np.std(table.X, axis=0), 1.0)
         columns = (table.X - table.X.mean(axis=0)) / scale
         whole = np.column_stack([np.ones(len(table)), columns, table.y])
         runs = self._runs(table)
         # A constant of each run is free: what shifts it says nothing of its noise.
         free = 1e3 * float(table.y.std()) + 1e-12
-        likelihood = np.empty(_SIZES)
-        for place, model in enumerate(models):
-            sized = [(rows, whitener.with_noise(model)) for rows, whitener in runs]
+
+        def model(size: float) -> NoiseModel:
+            return NoiseModel(self.model.N, size * others.B, size * others.K)
+
+        def likelihood(size: float) -> float:
+            sized = [(rows, whitener.with_noise(model(size))) for rows, whitener in runs]
             level = sum(whitener.log_det for _, whitener in sized)
-            likelihood[place] = _restricted(_triangles(sized, whole), free) - level
-        weights = np.exp(likelihood - likelihood.max() - 0.5 * places**2)
-        size = float(np.sqrt(weights @ sizes**2 / weights.sum()))
-        return replace(self, model=NoiseModel(self.model.N, size * others.B, size * others.K))
+            return _restricted(_triangles(sized, whole), free) - level
+
+        sizes, weights = _weighed_sizes(likelihood, 1.0, spread)
+        return replace(self, model=model(float(np.sqrt(weights @ sizes**2))))
 
     def _runs(self, table: TrainingTable) -> list[tuple[slice, Whitener]]:
         """Rows of each run and what whitens them."""
@@ -172,12 +168,26 @@ def shift_of_runs(units: Sequence[FloatArray], median: float, spread: float) -> 
     median, spread
         Median [deg/h] and standard deviation of the logarithm, of the prior.
     """
-    places = np.linspace(-_REACH, _REACH, _SIZES)
-    sizes = median * np.exp(spread * places)
     several = [runs for runs in units if len(runs) > 1]
-    likelihood = np.array([sum(_restricted(runs, size) for runs in several) for size in sizes.tolist()])
-    weights = np.exp(likelihood - likelihood.max() - 0.5 * places**2)
-    return float(weights @ sizes / weights.sum())
+    sizes, weights = _weighed_sizes(
+        lambda size: sum(_restricted(runs, size) for runs in several), median, spread
+    )
+    return float(weights @ sizes)
+
+
+def _weighed_sizes(
+    likelihood: Callable[[float], float], median: float, spread: float, reach: float = 4.0, count: int = 41
+) -> tuple[FloatArray, FloatArray]:
+    """Sizes, and their weights by a log-normal prior and a likelihood, shape (count,) each.
+
+    They go as far as `reach` deviations of the prior's logarithm either way: beyond lies 6e-5 of it, and
+    `count` puts five into each deviation.
+    """
+    places = np.linspace(-reach, reach, count)
+    sizes = median * np.exp(spread * places)
+    logs = np.array([likelihood(size) for size in sizes.tolist()]) - 0.5 * places**2
+    weights = np.exp(logs - logs.max())
+    return sizes, weights / weights.sum()
 
 
 def _restricted(triangles: FloatArray, shift: float) -> float:

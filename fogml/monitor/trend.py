@@ -40,7 +40,5 @@ def trend_quantiles(age: FloatArray, values: FloatArray, probabilities: tuple[fl
         values - values.mean(),
         absent_or_not(ratios),
     )
-    return [
-        students_ppf(probability, models.weights, models.constants, models.scales, models.freedom)
-        for probability in probabilities
-    ]
+    found = students_ppf(probabilities, models.weights, models.constants, models.scales, models.freedom)
+    return [float(value) for value in found]

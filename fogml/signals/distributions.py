@@ -68,7 +68,8 @@ def students_ppf(
 ) -> Any:
     """Value under which a mixture of Student's t about `centres` lies with a probability, by halving.
 
-    Weights and centres are of shape (m,), scales, none of which is 0, of the probability's shape and m.
+    Weights and centres are of shape (m,), and so are scales, none of which is 0, or of the probability's
+    shape and m.
     """
     asked = np.asarray(probability)
     ends = centres + scales * student_ppf(asked, freedom)[..., None]
