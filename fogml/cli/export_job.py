@@ -142,7 +142,10 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
         text += f"{accuracy['rms_exported']:.4g} with the export"
         rows.append([f"rms of {accuracy['averaging_s']:g} s averages on training folds", text])
     if size := report.get("cortex_m4"):
-        rows.append(["Cortex-M4", f"{size['flash_bytes']} bytes of flash, {size['ram_bytes']} of RAM"])
+        library = size["library_flash_bytes"]
+        more = f" and {library} of the compiler's library" if library else ""
+        told = f"{size['flash_bytes']} bytes of flash{more}, {size['ram_bytes']} of RAM"
+        rows.append(["Cortex-M4", told])
         if size.get("instructions_per_sample"):
             rows.append(["Cortex-M4, a sample", f"{size['instructions_per_sample']} instructions"])
     elif report["to"] == "c":

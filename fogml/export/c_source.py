@@ -170,6 +170,10 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "owns": windows.of_method("own"),
         "exponentials": windows.of_method("exp"),
         "firsts": windows.of_method("first"),
+        "takes_interval": any(
+            operator.method in ("exp", "own") or (operator.method == "first" and operator.unit_s is not None)
+            for operator in windows.operators
+        ),
         "directions": any(atom.operator == "sign" for atom in plan.atoms),
         "label": {
             i: f"{operator.method} of {windows.signals[operator.signal].text}"

@@ -88,9 +88,11 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
     fixed = source.numbers["fixed"]
     gyro_step = float(fixed["gyro_value"]) if fixed else 0.0
     past = history(plan, seed)
-    gyro = np.round(past.gyro / gyro_step) * gyro_step if fixed else past.gyro
+    counts = fixed and plan.gives_rate and plan.gyro_unit == "count"
+    gyro = np.round(past.gyro / gyro_step) * gyro_step if counts else past.gyro
     expected, flags = plan.compensated(past.atoms(plan), gyro)
     if fixed:
+        # Counts are whole; what whole steps of temperatures and outputs lose is part of the difference.
         temperatures = np.round(past.temperatures / fixed["temperature_value"])
         out, told = program.steps(past.time, temperatures, np.round(gyro / gyro_step))
         out = out * fixed["compensated_value"]

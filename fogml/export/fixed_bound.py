@@ -59,6 +59,7 @@ def fixed_point_error(plan: Plan, windows: Layout, dtype: str) -> float | None:
     columns = _column_errors(plan, scales, atoms)
     unit, arrays = 0.5 * 2.0**-scales.drift, plan.arrays
     total = unit + 0.5 * 2.0**-OUTPUT_BITS
+    taken = 0.0 if plan.gives_rate and plan.gyro_unit == "count" else 0.5 * 2.0**-scales.gyro_bits
     if "linear" in arrays:
         linear = np.abs(arrays["linear"])
         stored = np.abs(scales.linear * 2.0**-scales.linear_bits - arrays["linear"])
@@ -70,6 +71,8 @@ def fixed_point_error(plan: Plan, windows: Layout, dtype: str) -> float | None:
         step, (_, s1, s2) = 2.0**-scales.scale_bits, np.abs(arrays["scale"])
         off = step * (2.0 + most + most**2) + float(columns[0]) * (s1 + 2.0 * most * s2)
         total += gyro * off + unit
+        taken *= float(np.abs(arrays["scale"]) @ most ** np.arange(3))
+    total += taken
     return float(total) if np.isfinite(total) else None
 
 

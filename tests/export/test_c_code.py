@@ -119,6 +119,18 @@ def test_what_c_does_not_hold_is_said_with_what_it_does(text, dtype, told):
         c_source(Plan.of(model), dtype, [])
 
 
+@pytest.mark.parametrize("dtype", ["float32", "q31"])
+def test_each_window_compiles_alone(tmp_path, dtype):
+    """What a window leaves out is left out whole: nothing is declared that no other takes."""
+    kinds = ("first", "block, 40 s", "slope, 40 s", "exp, 40 s")
+    windows = [f"{form}(T_in)[{kind}]" for form in ("diff", "d") for kind in kinds]
+    for text in (*windows, "T_in", "lag(T_in, 300 s)", "play(T_in, 6 degC)", "T, diff(T), T*diff(T)"):
+        model = make_model("polynomial", features=text).fit(training_run())
+        source = c_source(Plan.of(model), dtype, [])
+        out, _ = outputs(CProgram(source, tmp_path, flags=QUICK), source, disturbed(4))
+        np.testing.assert_allclose(out, model.compensate(disturbed(4)).compensated, atol=1e-3)
+
+
 def test_true_times_are_heeded(model_of, tmp_path):
     model = model_of("rich")
     source = c_source(Plan.of(model), "float64", [])
@@ -316,6 +328,18 @@ def test_compiles_for_a_cortex_m4(model_of, tmp_path, dtype):
     assert source.layout.ring * 8 < size["ram_bytes"] < source.layout.ring * 32 + 600
     count = instructions_per_sample(source, tmp_path)
     assert count is None or source.plan.operations < count < 1_000_000
+
+
+@pytest.mark.parametrize(("dtype", "least"), [("float32", 0), ("float64", 500)])
+def test_what_a_cortex_m4_needs_is_counted_whole(model_of, tmp_path, dtype, least):
+    """Of a constant: a call, a subtraction, a store; in double precision the compiler's subtraction, too."""
+    if shutil.which("arm-none-eabi-gcc") is None or shutil.which("qemu-arm") is None:
+        pytest.skip("arm-none-eabi-gcc or qemu-arm is not installed")
+    source = c_source(Plan.of(model_of("mean")), dtype, [])
+    size = cortex_m4_size(source, tmp_path)
+    assert size["library_flash_bytes"] == 0 if least == 0 else size["library_flash_bytes"] > least
+    assert size["flash_bytes"] < 100
+    assert 8 <= instructions_per_sample(source, tmp_path) < 200
 
 
 def fast_run(sample_s: float) -> Run:

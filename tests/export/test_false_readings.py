@@ -146,6 +146,16 @@ def test_fixed_point_stays_within_its_proven_bound(model_of, tmp_path, name, dty
 
 
 @needs_cc
+@pytest.mark.parametrize(("name", "least"), [("none", 2.0**-13), ("polynomial", 1.9 * 2.0**-13)])
+def test_what_whole_steps_of_outputs_lose_on_the_way_in_is_counted(model_of, tmp_path, name, least):
+    """Half a step of 2^-12 deg/h where an output is taken, and half a step where it is given."""
+    plan = Plan.of(model_of(name))
+    source = c_source(plan, "q31", [])
+    found = c_difference(plan, source, CProgram(source, tmp_path, flags=QUICK), 0)
+    assert 0.99 * least < found.inside <= fixed_point_error(plan, source.layout, "q31") < 1.3 * 2.0**-12
+
+
+@needs_cc
 def test_a_coefficient_between_two_whole_numbers_stays_within_the_proven_bound(tmp_path):
     """Half a unit of 2^-22 of 60 degC, which a slope of 2000 deg/h/degC shows."""
     steep = Run("steep", ramps().columns | {"gyro": 1000.0 * ramps().columns["T"]})
