@@ -18,7 +18,6 @@ from fogml.features.signal import Signal
 from fogml.features.windows import Window, ring_of
 from fogml.runs.columns import is_temperature
 from fogml.signals.clock import (
-    GAP_INTERVALS,
     LEAST_SHARE,
     check_window,
     longest_gap_s,
@@ -225,7 +224,7 @@ def _check(window: Window, sample_s: float, memory: Atom | None) -> None:
 
 
 def _gap_s(window: Window, sample_s: float) -> float:
-    return GAP_INTERVALS * sample_s if window.method == "first" else longest_gap_s(window.length_s, sample_s)
+    return longest_gap_s(0.0 if window.method == "first" else window.length_s, sample_s)
 
 
 def _tick_us(sample_s: float, longest_s: float) -> int:

@@ -15,6 +15,7 @@ from fogml.gap.rows import BySample, Rows
 from fogml.gap.settings import STANDARD, RowSettings
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import Run
+from fogml.signals.clock import gap_starts
 from fogml.signals.smoothing import Smoothness, at_points, smoothed, window_difference
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, nominal_columns
@@ -155,9 +156,8 @@ def _usable(run: Run, settings: RowSettings) -> tuple[BoolArray, dict[str, int]]
 def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float, short: float) -> BoolArray:
     """Even rows into which the model's memory [s] reaches from over a long gap."""
     hidden = np.zeros(len(time), dtype=np.bool_)
-    jumps = np.flatnonzero(np.diff(run.time) > max(short * memory, 3.0 * run.sample_s))
-    for i in jumps.tolist():
-        hidden |= (time + 0.5 * row_s > run.time[i]) & (time - row_s < run.time[i + 1] + memory)
+    for i in gap_starts(run.time, run.sample_s, short * memory).tolist():
+        hidden |= (time + 0.5 * row_s > run.time[i - 1]) & (time - row_s < run.time[i] + memory)
     return hidden
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.turning import white_noise
 from fogml.signals import large
-from fogml.signals.clock import gap_starts
+from fogml.signals.clock import GAP_TOLERANCE, gap_starts
 
 SETTLED_DEGC_MIN = 0.05
 """A sensor slower than this is settled [degC/min]."""
@@ -146,7 +146,7 @@ def find_motion(time: FloatArray, sample_s: float, temperatures: Sequence[FloatA
 
 
 def _grid(time: FloatArray, sample_s: float, bin_s: float) -> Grid:
-    cuts = gap_starts(time, sample_s, max(LONGEST_BRIDGE_S, 10.0 * sample_s))
+    cuts = gap_starts(time, sample_s, max(LONGEST_BRIDGE_S, 10.0 * sample_s) + GAP_TOLERANCE * sample_s)
     begins = [cuts]
     for rows in large.pieces(time, overlap=1):
         number = np.floor((time[rows] - time[0]) / bin_s * (1.0 + 1e-12))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.signals import large
-from fogml.signals.clock import GAP_SHARE, Clock, gap_starts
+from fogml.signals.clock import Clock, gap_starts, longest_gap_s
 
 AVERAGING_S = 100.0
 """Averaging time of figures unless another is asked for [s]: long beside white noise, short beside thermal
@@ -106,7 +106,7 @@ def _windows(time: FloatArray, window_s: float, start: float | None) -> tuple[In
     if len(kept) == 0:
         return none, none
     sample_s = Clock(kept).sample_s
-    cuts = gap_starts(kept, sample_s, GAP_SHARE * window_s)
+    cuts = gap_starts(kept, sample_s, longest_gap_s(window_s, sample_s))
     edges = np.concatenate(([0], cuts, [len(kept)]))
     opens = [edges[:-1]]
     for part in large.pieces(kept, overlap=1):

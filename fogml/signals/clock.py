@@ -18,6 +18,8 @@ EDGE_TOLERANCE = 1e-6
 """Float noise forgiven at window edges, in sample intervals."""
 GAP_INTERVALS = 3.0
 """A gap is an interval longer than this many sample intervals."""
+GAP_TOLERANCE = 0.01
+"""Rounding of times forgiven in the length of a gap, in sample intervals: two lost samples are none."""
 GAP_SHARE = 0.25
 """A gap longer than this share of the window restarts the operator."""
 EXPONENTIAL_SPAN = 3.0
@@ -102,14 +104,14 @@ def gap_starts(time: FloatArray, sample_s: float, longest_s: float = 0.0) -> Ind
     longest_s
         Longest interval [s] that counts as none.
     """
-    limit = max(GAP_INTERVALS * sample_s, longest_s)
+    limit = max(longest_gap_s(0.0, sample_s), longest_s)
     found = [at + np.flatnonzero(steps > limit) + 1 for at, steps in large.differences(time)]
     return np.concatenate(found) if found else np.empty(0, dtype=np.intp)
 
 
 def longest_gap_s(window_s: float, sample_s: float) -> float:
     """Longest interval [s] that a window of `window_s` may span."""
-    return max(GAP_SHARE * window_s, GAP_INTERVALS * sample_s)
+    return max(GAP_SHARE * window_s, GAP_INTERVALS * sample_s) + GAP_TOLERANCE * sample_s
 
 
 def needed_s(span_s: float, sample_s: float) -> float:

@@ -13,7 +13,6 @@ from typing import Protocol
 from fogml.signals.clock import (
     EDGE_TOLERANCE,
     EXPONENTIAL_SPAN,
-    GAP_INTERVALS,
     LEAST_SHARE,
     check_window,
     counting_s,
@@ -189,7 +188,7 @@ class FirstDifferenceStream:
     """`fogml.signals.windows.first_difference` sample by sample; parameters as there."""
 
     def __init__(self, sample_s: float, unit_s: float | None = None) -> None:
-        self._longest_s, self._unit_s = GAP_INTERVALS * sample_s, unit_s
+        self._longest_s, self._unit_s = longest_gap_s(0.0, sample_s), unit_s
         self._last = -math.inf
         self._x = 0.0
 

@@ -33,7 +33,6 @@ from fogml.errors import InputError
 from fogml.signals.clock import (
     EDGE_TOLERANCE,
     EXPONENTIAL_SPAN,
-    GAP_INTERVALS,
     LEAST_SHARE,
     Clock,
     check_window,
@@ -204,7 +203,7 @@ def first_difference(
             values *= unit_s / grid
         return Windowed(values, full, full)
     interval = np.diff(clock.time)
-    np.less_equal(interval, GAP_INTERVALS * clock.sample_s, out=full[1:])
+    np.less_equal(interval, longest_gap_s(0.0, clock.sample_s), out=full[1:])
     if unit_s is not None:
         values[1:] *= unit_s / interval
     values[~full] = 0.0

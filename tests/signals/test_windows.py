@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals import window_streams as streams
-from fogml.signals.clock import Clock
+from fogml.signals.clock import Clock, gap_starts
 from fogml.signals.windows import block_difference, exponential, first_difference, slope
 
 WINDOWED = {"block": block_difference, "slope": slope, "exp": exponential}
@@ -261,6 +261,23 @@ def test_gaps_restart_only_beyond_a_quarter_of_the_window() -> None:
         assert full[500] == spanned
         assert full[500 + 127]
         assert full[500 + 126] == spanned
+
+
+@pytest.mark.parametrize("begins", [0.0, 1.7e9])
+@pytest.mark.parametrize("per_s", [100, 20, 10, 3])
+def test_rounding_of_times_makes_no_gap_of_two_lost_samples(per_s: int, begins: float) -> None:
+    """Whole numbers tell which intervals are longer than three; seconds do not hold them exactly."""
+    kept = np.ones(20_000, dtype=bool)
+    kept[100::50] = kept[101::50] = False
+    kept[102::500] = False
+    number = np.flatnonzero(kept)
+    longer = np.flatnonzero(np.diff(number) > 3) + 1
+    clock = Clock(begins + number / per_s)
+    np.testing.assert_array_equal(gap_starts(clock.time, clock.sample_s), longer)
+    full = first_difference(clock, np.zeros(len(number))).full
+    np.testing.assert_array_equal(np.flatnonzero(~full), [0, *longer])
+    stream = streams.FirstDifferenceStream(clock.sample_s)
+    np.testing.assert_array_equal([stream.step(t, 0.0)[1] for t in clock.time.tolist()], full)
 
 
 def test_first_difference_never_crosses_a_gap() -> None:
