@@ -20,7 +20,7 @@ from fogml.features.features import Features
 from fogml.features.operators import beyond
 from fogml.features.parse import parse_features
 from fogml.features.terms import Term
-from fogml.models.box import distance_outside, learn_box
+from fogml.models.box import learn_box
 from fogml.models.folds import Fold, time_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import MixedEffects, linear_regressor
@@ -45,8 +45,8 @@ class LeftOut:
         ``runs``, ``halves``, ``directions`` or ``blocks``.
     predicted, told
         Predictions of m members and the output, shapes (n, m) and (n,).
-    excess
-        Distance of the rows from the box of those fitted to, as a share of its span, shape (n,).
+    errors
+        Standard errors of what each member predicts, noise included [deg/h], shape (n, m).
     fold
         Indices of the rows fitted to, and of the part's.
     """
@@ -54,7 +54,7 @@ class LeftOut:
     kind: str
     predicted: FloatArray
     told: FloatArray
-    excess: FloatArray
+    errors: FloatArray
     fold: Fold
 
 
@@ -66,8 +66,8 @@ class Member(Protocol):
         """What it is linear in."""
         ...
 
-    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> FloatArray:
-        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's."""
+    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's; its standard errors."""
         ...
 
 
@@ -78,10 +78,10 @@ class SharedMember:
     features: Features
     found: MixedEffects
 
-    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> FloatArray:
-        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's."""
-        coef, intercept = self.found.given(rest)
-        return held @ coef + intercept
+    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's; its standard errors."""
+        coef, intercept, covariance = self.found.given(rest)
+        return held @ coef + intercept, _errors(held, covariance, self.found.own_variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +91,19 @@ class FittedMember:
     features: Features
     regressor: object
 
-    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> FloatArray:
-        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's."""
-        return predict_rows(refit(self.regressor, rest), held)
+    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's; its standard errors."""
+        fitted = refit(self.regressor, rest)
+        drift = predict_rows(fitted, held)
+        if not isinstance(fitted, LinearRegressor):
+            return drift, np.full(len(held), np.nan)
+        return drift, _errors(held, fitted.covariance_, fitted.residual_std_**2)
+
+
+def _errors(held: FloatArray, covariance: FloatArray, noise: float) -> FloatArray:
+    """Standard errors [deg/h] of rows, of the covariance of intercept and coefficients, and of the noise."""
+    design = np.column_stack([np.ones(len(held)), held])
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", design, covariance, design) + noise))
 
 
 def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[str, Fold]]:
@@ -146,18 +156,33 @@ def left_out(
     for kind, (fitted, held) in parts:
         rest, part = table.take(fitted), table.take(held)
         mean = float(rest.y.mean())
-        predicted, excess = [], np.zeros(len(part))
+        predicted, errors = [], []
         for member in members:
             places = [union.atoms.index(atom) for atom in member.features.atoms]
             own, of_rest, of_part = _bounded(member.features, rest.X[:, places], part.X[:, places])
             learn_box(own, [of_rest])
             linear = goes_on_linearly(getattr(member, "regressor", None)) or isinstance(member, SharedMember)
-            limited, outside = own.limit(of_part, np.ones(len(part), dtype=np.bool_), linear=linear)
-            excess = np.maximum(excess, distance_outside(of_part, outside, own))
+            limited, _ = own.limit(of_part, np.ones(len(part), dtype=np.bool_), linear=linear)
             columns = replace(rest, X=own.compose(of_rest))
-            predicted.append(member.on(own, columns, own.compose(limited)) - mean)
-        found.append(LeftOut(kind, np.column_stack(predicted), part.y - mean, excess, (fitted, held)))
+            drift, error = member.on(own, columns, own.compose(limited))
+            predicted.append(drift - mean)
+            errors.append(error)
+        told = part.y - mean
+        found.append(LeftOut(kind, np.column_stack(predicted), told, np.column_stack(errors), (fitted, held)))
     return found
+
+
+def errors_of_all(members: Sequence[Member], union: Features, table: TrainingTable) -> FloatArray:
+    """Standard errors of what members predict of the rows that they are fitted to [deg/h], shape (n, m).
+
+    Noise is included.
+    """
+    errors = []
+    for member in members:
+        own = member.features
+        columns = own.compose(table.X[:, [union.atoms.index(atom) for atom in own.atoms]])
+        errors.append(member.on(own, replace(table, X=columns), columns)[1])
+    return np.column_stack(errors)
 
 
 def temperatures_of(table: TrainingTable, features: Features) -> FloatArray:

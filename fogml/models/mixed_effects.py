@@ -56,10 +56,14 @@ class MixedEffects:
     _scale: _Scale
     _relative: FloatArray
 
-    def given(self, table: TrainingTable) -> tuple[FloatArray, float]:
-        """Coefficients and intercept [deg/h] given other rows, with the sizes as they were found."""
-        coef, intercept, _ = _posterior(table, self._scale, self._relative)
-        return coef, intercept
+    def given(self, table: TrainingTable) -> tuple[FloatArray, float, FloatArray]:
+        """Coefficients, intercept [deg/h] and their covariance of other rows, with the sizes as found."""
+        return _posterior(table, self._scale, self._relative)
+
+    @property
+    def own_variance(self) -> float:
+        """Variance of what is a run's own, and of the noise [(deg/h)^2]."""
+        return sum(self.sizes[name] ** 2 for name in (*OWN_PARTS, "noise"))
 
     def regressor(self) -> LinearRegressor:
         """The shared part as a linear regressor."""

@@ -18,6 +18,7 @@ from fogml.models.combination import (
     LeftOut,
     SharedMember,
     combined,
+    errors_of_all,
     left_out,
     left_out_parts,
     temperatures_of,
@@ -90,7 +91,8 @@ class MixedEffectsModel(FeatureModel):
         self.skill_ = float(weights[0])
         mean = float(table.y.mean())
         _, self.regressor_ = combined([(features, shared)], weights, mean)
-        self._found = intervals_of(parts, weights, table, self._both_ways)
+        errors = errors_of_all([member], features, table)
+        self._found = intervals_of(parts, weights, table, self._both_ways, errors)
         return len(table)
 
     def _size_priors(self, table: TrainingTable) -> SizePriors:

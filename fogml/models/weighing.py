@@ -24,6 +24,7 @@ from fogml.models.combination import (
     Member,
     SharedMember,
     combined,
+    errors_of_all,
     left_out,
     left_out_parts,
     temperatures_of,
@@ -130,7 +131,8 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
         alone = _rms(left_out([own_member], union, table, parts), np.ones(1))
         if alone < CLEARLY * left:
             return Weighed(simple, {choice.name: 1.0}, alone, mean_left, (own_member,), table, union)
-    intervals = intervals_of(lefts, weights, table, both_ways)
+    errors = errors_of_all(list(members.values()), union, table)
+    intervals = intervals_of(lefts, weights, table, both_ways, errors)
     chosen = [
         (member.features, _regressor(member)) for member, weight in zip(members.values(), weights) if weight
     ]

@@ -135,15 +135,20 @@ def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
 
 
 def intervals_of(
-    parts: Sequence[LeftOut], weights: FloatArray, table: TrainingTable, both_ways: bool
+    parts: Sequence[LeftOut],
+    weights: FloatArray,
+    table: TrainingTable,
+    both_ways: bool,
+    errors: FloatArray,
 ) -> Intervals:
     """Half-widths from what is left on runs left out; of one run on its parts, widened.
 
     Of several runs they are those of `half_widths_of_runs`. Of one it is the widest of the kinds of its
-    parts, each with the slow noise that it does not show, times `UNSEEN_SHIFT`.
+    parts, each with the slow noise that it does not show, times `UNSEEN_SHIFT`: of blocks, and of directions
+    where its temperature moves both ways, else of halves.
 
-    There errors are taken relative to how the half-width grows outside the box, as a half or a direction left
-    out lies outside of the rest; runs left out count as they are.
+    There what is left on a row counts relative to its standard error, over that of a fit to all rows: a
+    direction left out is told by less. Runs left out count as they are.
 
     Parameters
     ----------
@@ -154,14 +159,17 @@ def intervals_of(
     both_ways
         Whether temperature moves both ways in training; else nothing can be verified of the way back, and
         the variance of the drift that the runs hold is added.
+    errors
+        Standard errors of what the members predict of the averages, fitted to all of them [deg/h], (n, m).
     """
     runs = [part for part in parts if part.kind == "runs"]
-    kinds = ["runs"] if runs else list(dict.fromkeys(part.kind for part in parts))
+    shown = ("directions", "blocks") if both_ways else ("halves", "blocks")
+    kinds = ["runs"] if runs else [kind for kind in shown if any(part.kind == kind for part in parts)]
     if runs:
         half = half_widths_of_runs([part.told - part.predicted @ weights for part in runs])
     else:
         widest = [
-            unseen.widened(quantiles_of_parts(_lefts(parts, weights, kind), np.array(LEVELS)), LEVELS)
+            unseen.widened(quantiles_of_parts(_lefts(parts, weights, kind, errors), np.array(LEVELS)), LEVELS)
             for kind, unseen in zip(kinds, _unseen(parts, weights, table, kinds), strict=True)
         ]
         half = UNSEEN_SHIFT * np.max([np.zeros(len(LEVELS)), *widest], axis=0)
@@ -188,10 +196,13 @@ def _unseen(
     return unseen_noises(table, predicted, [[p.fold for p in parts if p.kind == kind] for kind in kinds])
 
 
-def _lefts(parts: Sequence[LeftOut], weights: FloatArray, kind: str) -> list[FloatArray]:
-    """Sizes of what is left on each part of a kind [deg/h], relative to how the half-width grows."""
-    return [
-        np.abs(part.told - part.predicted @ weights) / (1.0 + WIDENING_PER_SPAN * part.excess)
-        for part in parts
-        if part.kind == kind
-    ]
+def _lefts(parts: Sequence[LeftOut], weights: FloatArray, kind: str, errors: FloatArray) -> list[FloatArray]:
+    """Sizes of what is left on each part of a kind [deg/h], as of a fit to all rows."""
+    found = []
+    for part in parts:
+        if part.kind == kind:
+            left = np.abs(part.told - part.predicted @ weights)
+            if weights.any():
+                left /= np.maximum((part.errors @ weights) / (errors[part.fold[1]] @ weights), 1.0)
+            found.append(left)
+    return found

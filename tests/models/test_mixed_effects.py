@@ -150,8 +150,8 @@ def test_both_ways_means_a_fifth_of_the_span_each_way(temperatures: list, expect
 
 
 def part(predicted: np.ndarray, told: np.ndarray, kind: str = "runs") -> LeftOut:
-    rows = np.arange(len(told))
-    return LeftOut(kind, np.atleast_2d(predicted.T).T, told, np.zeros(len(told)), (rows[:0], rows))
+    rows, columns = np.arange(len(told)), np.atleast_2d(predicted.T).T
+    return LeftOut(kind, columns, told, np.ones(columns.shape), (rows[:0], rows))
 
 
 def test_skill_is_the_least_squares_share_between_nothing_and_all() -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from fogml.models.box import direction_is_told
 from fogml.models.combination import LeftOut
@@ -11,7 +12,7 @@ from fogml.models.weights import intervals_of, skill_of, weights_of
 
 def part(predicted, told, kind="runs"):
     rows = np.arange(len(told))
-    return LeftOut(kind, predicted, told, np.zeros(len(told)), (rows[:0], rows))
+    return LeftOut(kind, predicted, told, np.ones(predicted.shape), (rows[:0], rows))
 
 
 def test_of_several_runs_what_is_told_within_a_run_has_no_say():
@@ -97,7 +98,37 @@ def test_intervals_of_runs_left_out_cover_another_run(count, about):
         shifts = rng.normal(size=count + others)
         told = shifts[:, None] + about * rng.normal(size=(count + others, rows))
         lefts = [part(np.zeros((rows, 1)), left) for left in told[others:]]
-        half = intervals_of(lefts, np.ones(1), table, True).half_width(0.9)
+        half = intervals_of(lefts, np.ones(1), table, True, np.ones((rows, 1))).half_width(0.9)
         covered.append(np.mean(np.abs(told[:others]) <= half))
     # Three standard errors of the trials; ranks of few runs are coarse, to the safe side.
     assert 0.9 - 0.04 <= np.mean(covered) <= 0.9 + 0.04 + 1.0 / (count + 1) * (count >= 9)
+
+
+def test_what_a_direction_left_out_tells_counts_as_of_a_fit_to_both():
+    # White noise, least squares: a direction foretells the other with ten times the noise and more. Intervals
+    # of another run are those of the noise, times the shift that one run does not show.
+    rng = np.random.default_rng(8)
+    rows, noise, widths, left = 400, 0.02, [], []
+    rising = np.arange(rows) < rows // 2
+    T = np.interp(np.arange(rows), [0, 199, 399], [-1.0, 1.0, -1.0])
+    rate = np.where(rising, 1.0, -1.0) + 0.05 * rng.normal(size=rows)
+    design = np.column_stack([np.ones(rows), T, T**2, rate, T * rate])
+
+    def fitted(fit, to, y):
+        gain = np.linalg.pinv(design[fit])
+        return design[to] @ gain @ y[fit], noise * np.sqrt(1.0 + np.sum((design[to] @ gain) ** 2, axis=1))
+
+    halves = (np.flatnonzero(rising), np.flatnonzero(~rising))
+    for _ in range(40):
+        y = noise * rng.normal(size=rows)
+        time_s = 100.0 * np.arange(rows)
+        table = TrainingTable(design[:, 1:], y, np.zeros(rows, dtype=int), time_s, np.arange(rows), 100.0)
+        parts = []
+        for fit, held in (halves, halves[::-1]):
+            predicted, errors = fitted(fit, held, y)
+            parts.append(LeftOut("directions", predicted[:, None], y[held], errors[:, None], (fit, held)))
+        errors = fitted(np.arange(rows), np.arange(rows), y)[1][:, None]
+        widths.append(intervals_of(parts, np.ones(1), table, True, errors).half_width(0.9))
+        left.append(y[held] - predicted)
+    assert np.std(left) > 4.0 * noise
+    assert np.mean(widths) == pytest.approx(2.0**0.5 * norm.ppf(0.95) * noise, rel=0.15)
