@@ -14,7 +14,7 @@ from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.fleet.constants import ONE_RUN, FleetConstants
 from fogml.fleet.covariates import CovariateEffects, Covariates
-from fogml.models.combination import LeftOut, SharedMember
+from fogml.models.combination import LeftOut, SharedMember, standard_errors
 from fogml.models.generalised_least_squares import (
     RunsNoise,
     runs_noise,
@@ -84,9 +84,11 @@ class DrawnMember(SharedMember):
         rows = shifted(self.noise.triangles(table, self.prior.columns(table.X)), self.shift)
         return rows[:, :-1].T @ rows[:, :-1], rows[:, :-1].T @ rows[:, -1]
 
-    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> FloatArray:
-        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's."""
-        return self.prior.columns(held) @ posterior(*self.told(rest), self.prior)[0]
+    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's; its standard errors."""
+        columns = self.prior.columns(held)
+        solution, covariance, _ = posterior(*self.told(rest), self.prior)
+        return columns @ solution, standard_errors(columns, covariance, self.found.own_variance)
 
     def regressor(self, table: TrainingTable) -> LinearRegressor:
         """The shared part given averages of features."""

@@ -81,7 +81,7 @@ class SharedMember:
     def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's; its standard errors."""
         coef, intercept, covariance = self.found.given(rest)
-        return held @ coef + intercept, _errors(held, covariance, self.found.own_variance)
+        return held @ coef + intercept, standard_errors(held, covariance, self.found.own_variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +97,17 @@ class FittedMember:
         drift = predict_rows(fitted, held)
         if not isinstance(fitted, LinearRegressor):
             return drift, np.full(len(held), np.nan)
-        return drift, _errors(held, fitted.covariance_, fitted.residual_std_**2)
+        return drift, standard_errors(held, fitted.covariance_, fitted.residual_std_**2)
 
 
-def _errors(held: FloatArray, covariance: FloatArray, noise: float) -> FloatArray:
-    """Standard errors [deg/h] of rows, of the covariance of intercept and coefficients, and of the noise."""
-    design = np.column_stack([np.ones(len(held)), held])
-    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", design, covariance, design) + noise))
+def standard_errors(columns: FloatArray, covariance: FloatArray, noise: float) -> FloatArray:
+    """Standard errors [deg/h] of rows of columns (n, k), of their coefficients' covariance and of the noise.
+
+    The covariance is that of the coefficients, (k, k), or of an intercept before them.
+    """
+    if len(covariance) > columns.shape[1]:
+        columns = np.column_stack([np.ones(len(columns)), columns])
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", columns, covariance, columns) + noise))
 
 
 def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[str, Fold]]:
