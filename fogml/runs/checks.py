@@ -23,6 +23,8 @@ MOVED_DEGC = 0.5
 """What another sensor must have moved by meanwhile [degC], at least."""
 SATURATED_SAMPLES = 3
 """Samples at an extreme, one after the other, from which on the output may saturate."""
+SATURATED_IN_ALL = 10
+"""Samples at an extreme in all: noise that reaches beyond it now and then is cut off one by one."""
 SMALL_SPAN_DEGC = 5.0
 """A temperature span under this [degC] is small."""
 _MARK_SHARE = 0.49
@@ -49,9 +51,9 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         A temperature holds one value for over 10 min while another moves by more than 0.5 degC
         and more than twice the sensor's resolution; or the gyro does, whose samples else differ.
     ``saturation``
-        The gyro stays at its greatest or least value for 3 samples on end, and is there over 3
-        times more often than at the value next to it, so that noise is cut off there; not
-        where a quiet output rests at other values as well.
+        The gyro stays at its greatest or least value for 3 samples on end, or is there in 10 in
+        all, and over 3 times more often than at the value next to it, so that noise is cut off
+        there; not where a quiet output rests at other values as well.
     ``outliers``
         Gyro samples over 8 robust sigma off the median of the five about them (`find_outliers`).
     ``small_temperature_span``
@@ -196,14 +198,14 @@ def _saturated(run: Run) -> Iterator[Finding]:
         yield Finding("saturation", message, column="gyro", row=1, count=len(gyro))
         return
     extremes = [(extreme, gyro == extreme) for extreme in (greatest, least)]
-    if all(_longest(at) < SATURATED_SAMPLES for _, at in extremes):
+    if not any(_may_saturate(at) for _, at in extremes):
         return
     if greatest - least < _LEAST_STEPS * _resolution(gyro):
         return  # so few steps hold no shape of noise that could be cut off
     usual = None
     for extreme, at in extremes:
         count, spell = int(np.count_nonzero(at)), _longest(at)
-        if spell < SATURATED_SAMPLES:
+        if not _may_saturate(at):
             continue
         if usual is None:
             same = gyro[1:] == gyro[:-1]
@@ -218,6 +220,10 @@ def _saturated(run: Run) -> Iterator[Finding]:
         if not is_tail and not rests:
             message = f"{count} samples of 'gyro' at its extreme of {extreme:.6g}; the output may saturate"
             yield Finding("saturation", message, column="gyro", row=int(np.argmax(at)) + 1, count=count)
+
+
+def _may_saturate(at: BoolArray) -> bool:
+    return _longest(at) >= SATURATED_SAMPLES or int(np.count_nonzero(at)) >= SATURATED_IN_ALL
 
 
 def _longest(mask: BoolArray) -> int:

@@ -13,13 +13,14 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
 from fogml.runs.noise_series import (
+    LOST,
     NoiseSeries,
     joined,
     rows_at_rest,
     series_of,
     spectrum_of_runs,
 )
-from fogml.runs.noise_words import doubts_of, gaps_of, model_told, words_of
+from fogml.runs.noise_words import coarse_steps, doubts_of, gaps_of, model_told, words_of
 from fogml.runs.run import Run
 from fogml.signals import large
 from fogml.signals.allan import AllanResult, allan_deviation
@@ -107,8 +108,9 @@ def noise_report(
         *(
             warning
             for one, spans in zip(series, moves)
-            for warning in _warnings(one.run, spans, one.segments)
+            for warning in _warnings(one.run, spans, one.segments, one.sample_s)
         ),
+        *(warning for one in series for warning in coarse_steps(one)),
         *doubts_of(terms, steady, alone),
     ]
     notes = [one.facts.notes for one in runs if one.facts.notes]
@@ -193,7 +195,9 @@ def _terms(found: NoiseTerms, moving: dict[str, float]) -> dict[str, dict[str, A
     return terms
 
 
-def _warnings(run: Run, moving: dict[str, float], segments: list[slice]) -> list[dict[str, str]]:
+def _warnings(
+    run: Run, moving: dict[str, float], segments: list[slice], sample_s: float
+) -> list[dict[str, str]]:
     warnings: list[dict[str, str]] = []
     if moving:
         spans = ", ".join(f"{name} by {span:.3g} degC" for name, span in moving.items())
@@ -213,9 +217,12 @@ def _warnings(run: Run, moving: dict[str, float], segments: list[slice]) -> list
         warnings.append({"code": "turning", "message": message})
     if _spread(run) > UNEVEN * run.sample_s:
         message = (
-            f"Samples are not evenly spaced: averaging times take them as {run.sample_s:.4g} s apart, as "
+            f"Samples are not evenly spaced: averaging times take them as {sample_s:.4g} s apart, as "
             "they are on average."
         )
+        lost = 1.0 - (run.sample_s / sample_s) ** 0.5
+        if lost > 0.5 * LOST:
+            message += f" If rows are lost, N of the gyro itself is {lost:.1%} less."
         warnings.append({"code": "irregular_sampling", "message": message})
     return warnings
 

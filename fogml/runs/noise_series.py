@@ -21,6 +21,8 @@ _FEWEST = 30
 """Changes needed to tell a hold."""
 _SPREAD = 0.3
 """Greatest variance of the lengths of a hold that does not last whole samples; two lengths make 1/4."""
+_TO_AND_FRO = 0.9
+"""Share of changes by one step of the output from which on repeats tell no hold of no whole samples."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,11 @@ def hold_of(values: FloatArray) -> ValueHold:
             return every
     elif float(np.var(lengths)) > _SPREAD or int(lengths.max()) > 2:
         return every
+    else:
+        # Counts of a quiet output go to and fro between neighbours for one sample and two, held or not.
+        sizes = np.abs(values[changes] - values[changes - 1])
+        if np.mean(sizes < 1.5 * sizes.min()) > _TO_AND_FRO:
+            return every
     return ValueHold(float(np.mean(lengths)), changes.astype(np.intp))
 
 

@@ -10,16 +10,22 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.intervals import Z90
-from fogml.runs.noise_series import NoiseSeries
+from fogml.runs.noise_series import HOLD_ROWS, NoiseSeries
 from fogml.runs.run import Run
+from fogml.runs.steps import recorded_step
 from fogml.signals.distributions import chi2_sf
 from fogml.signals.noise_terms import NoiseTerms
 from fogml.signals.stationarity import Stationarity
 
 DOUBT = 1e-3
 """Chance of a warning that a right model, or a steady run, gets."""
+DITHERED = 0.6
+"""Standard deviation of samples, in steps of the output, from which on rounding to those makes white noise:
+an angle with 0.4 steps of noise a sample, and the rounding itself (simulated)."""
 MOST_LINES = 5
 """Sinusoids that are listed."""
+_BLOCK = 32
+_URAD = np.pi / 180.0 / 3600.0 * 1e6
 
 
 def gaps_of(runs: Sequence[Run]) -> dict[str, Any]:
@@ -109,6 +115,23 @@ def words_of(terms: NoiseTerms, series: NoiseSeries, runs: Sequence[Run]) -> lis
             f"{gaps['count']} gaps ({gaps['lost_s']:.4g} s lost): no average and no difference crosses one."
         )
     return words
+
+
+def coarse_steps(series: NoiseSeries) -> list[dict[str, str]]:
+    """A warning where samples hardly leave a step of the output, so that its rounding is no white noise."""
+    values = max(series.stretches, key=len)[:HOLD_ROWS]
+    step = recorded_step(values)
+    blocks = values[: len(values) // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
+    if step == 0.0 or len(blocks) == 0 or float(np.median(blocks.std(axis=1))) >= DITHERED * step:
+        return []
+    angle = step * series.new_s
+    message = (
+        f"The output comes in steps of {step:.3g} deg/h ({angle:.3g} arcsec a sample), and its noise hardly "
+        "moves it from one to the next: what rounding makes is then no white noise, and Q and N may be off "
+        f"by more than their intervals. Steps of an angle make a Q of {angle * _URAD / 12.0**0.5:.3g} urad; "
+        "record more slowly, or finer, for N."
+    )
+    return [{"code": "coarse_steps", "message": message}]
 
 
 def doubts_of(

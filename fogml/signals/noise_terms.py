@@ -13,6 +13,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
 from fogml.signals.allan import AllanResult, allan_deviation
+from fogml.signals.noise_ramp import ramp
 from fogml.signals.noise_search import NoiseSearch, search_noise
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 from fogml.signals.spectrum_fit import SpectrumFit
@@ -108,9 +109,9 @@ class NoiseTerms:
         taus = np.atleast_1d(np.asarray(taus_s, dtype=np.float64))
         if self.search is None:
             return np.zeros_like(taus)
-        ramp = self.terms["R"].fitted / _SCALES["R"]
+        slope = self.terms["R"].fitted / _SCALES["R"]
         variance = _allan_variance(self.search.best, self.search.spectrum, taus, filtered=filtered)
-        return np.asarray(np.sqrt(variance + 0.5 * (ramp * taus) ** 2))
+        return np.asarray(np.sqrt(variance + 0.5 * (slope * taus) ** 2))
 
 
 def noise_terms(
@@ -163,7 +164,7 @@ def noise_terms(
         low, high = _interval(search, name, level)
         fitted, lower, upper = (_SCALES[name] * float(np.sqrt(v)) for v in (search.best[name], low, high))
         terms[name] = NoiseTerm(fitted if fitted > 0 else None, lower, upper, _UNITS[name], fitted)
-    terms["R"] = _ramp(search.best, spectrum.removed, level, ramps)
+    terms["R"] = _ramp(search, terms["K"], level, ramps)
     taus = allan.taus_s
     holds = _holds_from(search, taus)
     seen = (allan.adev > 0) & (taus >= max(holds, least_tau_s) * (1.0 - 1e-9))
@@ -269,17 +270,16 @@ def _crossing(
     return c
 
 
-def _ramp(fit: SpectrumFit, removed: FloatArray, level: float, ramps: int | None) -> NoiseTerm:
-    """The ramp, from the slopes of all runs: their root mean square where there are several."""
+def _ramp(search: NoiseSearch, walk: NoiseTerm, level: float, ramps: int | None) -> NoiseTerm:
+    """The ramp, where it is told from none and from a random walk."""
     from scipy.special import ndtri
 
-    count = len(fit.constants) if ramps is None else min(ramps, len(fit.constants))
-    if count == 0:
+    found = ramp(search, walk.upper / _SCALES["K"], search.spectrum.removed, ramps)
+    if found is None:
         return NoiseTerm(None, 0.0, 0.0, _UNITS["R"], 0.0)
-    z = float(ndtri(0.5 + 0.5 * level))
-    size = float(np.sqrt(np.mean((fit.constants + removed)[:count] ** 2))) * _SCALES["R"]
-    error = float(np.sqrt(np.trace(fit.covariance[:count, :count]) / count)) / np.sqrt(count) * _SCALES["R"]
-    lower, upper = max(size - z * error, 0.0), size + z * error
+    size, error = (_SCALES["R"] * value for value in found)
+    half = float(ndtri(0.5 + 0.5 * level)) * error
+    lower, upper = max(size - half, 0.0), size + half
     return NoiseTerm(size if lower > 0.0 else None, lower, upper, _UNITS["R"], size if lower > 0.0 else 0.0)
 
 

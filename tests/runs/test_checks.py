@@ -242,7 +242,7 @@ class TestOutliers:
 
 
 class TestSaturation:
-    @pytest.mark.parametrize("limit", [1.5, 2.0])
+    @pytest.mark.parametrize("limit", [1.5, 2.0, 3.0])
     def test_noise_cut_off_above(self, limit):
         columns = noisy()
         columns["gyro"] = np.minimum(np.random.default_rng(0).normal(0.0, 1.0, 20_000), limit)

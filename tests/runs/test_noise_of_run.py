@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -115,6 +116,37 @@ def test_uneven_samples_are_told():
     run = still_run()
     uneven = run.with_columns(time=run.time + 0.04 * rng.uniform(size=len(run)))
     assert [warning["code"] for warning in noise_report(uneven)["warnings"]] == ["irregular_sampling"]
+
+
+def test_what_lost_rows_add_to_white_noise_is_told():
+    run = still_run()
+    kept = np.random.default_rng(4).random(len(run)) > 0.1
+    columns = {"time": run.time[kept], "gyro": run.columns["gyro"][kept]}
+    report = noise_report(Run.from_columns("lossy", **columns))
+    (warning,) = report["warnings"]
+    told = re.search(r"as ([0-9.]+) s apart.* itself is ([0-9.]+)% less", warning["message"])
+    # A tenth of the rows lost: those kept stand for 1/0.9 of their time.
+    assert float(told[1]) == pytest.approx(0.1 / 0.9, rel=2e-2)
+    assert float(told[2]) == pytest.approx(100.0 * (1.0 - 0.9**0.5), abs=0.4)
+    assert report["terms"]["N"]["value"] * (1.0 - 0.01 * float(told[2])) == pytest.approx(0.01, rel=0.02)
+
+
+@pytest.mark.parametrize(("step_arcsec", "told"), [(0.5, True), (0.005, False)])
+def test_counts_that_noise_does_not_move_are_no_white_noise(step_arcsec, told):
+    """Angles in whole counts at 100 Hz, of 0.006 arcsec of noise a sample and two thirds of a count each."""
+    rng = np.random.default_rng(2)
+    angle = 0.64 * step_arcsec * np.arange(30_001.0) + np.cumsum(0.006 * rng.normal(size=30_001))
+    counts = np.diff(np.floor(angle / step_arcsec))
+    run = Run.from_columns("counts", time=0.01 * np.arange(30_000), gyro=counts * step_arcsec / 0.01)
+    report = noise_report(run)
+    assert ("coarse_steps" in [warning["code"] for warning in report["warnings"]]) == told
+    q_urad = step_arcsec / np.sqrt(12.0) * np.deg2rad(1.0) / 3600.0 * 1e6
+    low, high = report["terms"]["Q"]["ci"]
+    if told:
+        (message,) = [w["message"] for w in report["warnings"] if w["code"] == "coarse_steps"]
+        assert f"{q_urad:.3g} urad" in message and f"{step_arcsec:.3g} arcsec" in message
+    else:
+        assert low < 1.02 * q_urad and high > 0.98 * q_urad
 
 
 def test_asked_times_and_counts():

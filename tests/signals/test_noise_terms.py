@@ -146,6 +146,20 @@ def test_what_the_data_do_not_hold_is_bounded_not_invented():
     assert all(r.terms["K"].upper > 0 for r in results)
 
 
+def test_a_random_walk_that_hardly_shows_is_no_ramp():
+    """No line is told better than by generalised least squares under the true noise."""
+    count, white, step = 2000, 1.2, 0.005
+    index = np.arange(1.0, count + 1.0)
+    covariance = white**2 * np.eye(count) + step**2 * np.minimum.outer(index, index)
+    line = np.column_stack([np.ones(count), index])
+    error = HOUR * np.sqrt(np.linalg.inv(line.T @ np.linalg.solve(covariance, line))[1, 1])
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        rate = white * rng.normal(size=count) + step * np.cumsum(rng.normal(size=count))
+        told = noise_terms_of(rate, 1.0).terms["R"]
+        assert told.upper - 0.5 * (told.upper + told.lower) * (told.lower > 0.0) > 0.8 * 1.645 * error
+
+
 def test_a_sinusoid_is_told_apart_and_noise_of_another_kind_widens_the_intervals():
     rng = np.random.default_rng(4)
     rate = gyro(rng, 40_000, N=0.01)
