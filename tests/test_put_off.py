@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fogml.put_off import put_off
+from fogml.models.scikit_learn import put_off
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import numpy as np
 from experiments.results import write_results
 from fogml import __version__
 from fogml.lab.misalignment import decouple
-from fogml.lab.misalignment_methods import compare_methods, relative_error_ppm
+from fogml.lab.misalignment_json import compare_methods, relative_error_ppm
 from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
 from fogml.outputs import whole_file

@@ -15,10 +15,9 @@ from fogml.models.names import make_model
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.tuning.plan import Plan
-from fogml.tuning.references import AUTO, DEFAULT, reference_choices
 from fogml.tuning.space import Choice, Space
 from fogml.tuning.sweep import run_sweep
-from fogml.tuning.winner import complete, winner
+from fogml.tuning.winner import AUTO, DEFAULT, complete, reference_choices, winner
 
 UNITS, TRIALS, BIAS_SPREAD = 20, 10, 0.1
 """Units; trials of a sweep; spread of the bias from run to run [deg/h]."""

@@ -1,4 +1,10 @@
-"""Jobs of the app: a folder each, so that they outlive the server and are found again."""
+"""Jobs of the app: a folder each, so that they outlive the server and are found again.
+
+``python -m fogml.app.runner FOLDER``: runs a job's command to its end, whatever becomes of who started it.
+
+The process has a session of its own. ``process.json`` says that it runs and cannot be made twice, so that a
+job never runs twice; ``ended.json`` says how it ended.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +16,73 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from fogml.app.runner import CANCELLED, ENDED, PROCESS, tell
 from fogml.errors import InputError
-from fogml.processes import process_is_alive
+from fogml.json_files import write_json
+from fogml.outputs import whole_file
+from fogml.processes import process_is_alive, process_start
+
+PROCESS, ENDED, CANCELLED = "process.json", "ended.json", "cancelled"
+
+
+def tell(path: Path, values: Any) -> None:
+    """Write JSON that is there whole or not at all."""
+    with whole_file(path) as partial:
+        write_json(partial, values)
+
+
+def _claim(folder: Path, process: Any) -> bool:
+    """Say that a job runs; False if that was said before."""
+    partial = folder / f"{PROCESS}.{os.getpid()}"
+    write_json(partial, process)
+    try:
+        os.link(partial, folder / PROCESS)
+    except FileExistsError:
+        return False
+    finally:
+        partial.unlink()
+    return True
+
+
+def begin(folder: Path) -> None:
+    """Begin the job of a folder in a process of its own, unless it was begun before."""
+    heard, told = os.pipe()
+    pid = os.fork()
+    if pid:
+        process = {"pid": pid, "started": process_start(pid), "child": None}
+        os.write(told, b"1" if _claim(folder, process) else b"0")
+        return
+    os.setsid()
+    if os.read(heard, 1) == b"1":
+        run(folder)
+
+
+def run(folder: Path) -> None:
+    """Run the job of a folder, from the folder two above it, to its end."""
+    words = json.loads((folder / "job.json").read_text(encoding="utf-8"))["words"]
+    process = json.loads((folder / PROCESS).read_text(encoding="utf-8"))
+    # Only what is told to the command ends it; with a handler rather than ignored, it hears of that itself.
+    for name in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
+        signal.signal(name, lambda number, frame: None)
+    began = time.monotonic()
+    # Without the folder on the path: what lies there is data.
+    command = [sys.executable, "-P", "-m", "fogml", *words]
+    with open(folder / "stdout", "wb") as out, open(folder / "stderr", "wb") as err:
+        child = subprocess.Popen(
+            command, cwd=folder.parents[1], stdin=subprocess.DEVNULL, stdout=out, stderr=err
+        )
+        tell(folder / PROCESS, {**process, "child": child.pid})
+        if (folder / CANCELLED).exists():
+            with contextlib.suppress(ProcessLookupError):
+                child.terminate()
+        status = child.wait()
+    tell(folder / ENDED, {"status": status, "seconds": time.monotonic() - began})
+
 
 TAIL_BYTES = 20_000
 """How much of what a job printed is shown: its end."""
@@ -70,7 +135,7 @@ class Jobs:
         for name in [name for name, state in states.items() if state == "waiting"][: max(free, 0)]:
             # It returns once the job is under way, in a session of its own.
             subprocess.run(
-                [sys.executable, "-P", "-m", "fogml.app.runner", str(self.folder / name)],
+                [sys.executable, "-P", "-m", "fogml.app.jobs", str(self.folder / name)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -204,3 +269,7 @@ def _tail(path: Path, count: int) -> str:
             return file.read().decode("utf-8", "replace")
     except OSError:
         return ""
+
+
+if __name__ == "__main__":
+    begin(Path(sys.argv[1]))

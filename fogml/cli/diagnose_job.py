@@ -25,11 +25,6 @@ from fogml.runs.run import Run
 from fogml.twin.twin_file import load_twin
 
 
-def of_several_units(runs: Sequence[Run]) -> bool:
-    """Whether the runs to fit on are of more than one unit."""
-    return len({run.facts.unit for run in runs if run.facts.unit}) > 1
-
-
 def diagnose_several(
     settings: DiagnoseSettings,
     model: TwinModel,
@@ -108,7 +103,7 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
         column = _column(settings, model, runs, held_out, terminal)
         if column is not None:
             model, runs, held_out = column.model, column.fit, column.held_out
-        if of_several_units(runs):
+        if len({run.facts.unit for run in runs if run.facts.unit}) > 1:
             with terminal.work("diagnosing") as work:
                 several = diagnose_several(settings, model, runs, held_out, noise, work.doing)
                 work.doing("writing")

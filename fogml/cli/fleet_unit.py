@@ -86,7 +86,7 @@ class UnitWork:
         return {
             **_told(judgement),
             "constants": self._constants(unit, train_runs),
-            "parameters": _count(model),
+            "parameters": model.parameter_count(),
         }
 
     def _compare(self, unit: Unit, folder: Path) -> dict[str, Any]:
@@ -216,7 +216,3 @@ def _told(judgement: Judgement) -> dict[str, Any]:
         },
         "notes": [str(note) for note in (*judgement.notes, *judgement.model.get("notes", ()))],
     }
-
-
-def _count(model: DriftModel) -> int:
-    return model.parameter_count()

@@ -57,8 +57,7 @@ def _read(paths: tuple[str, ...], repair: Repairing, identities: list[Any]) -> l
 def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
     """Run the trials that are missing, judge the winner once on the test runs, write the results."""
     from fogml.report.sweep_page import sweep_page
-    from fogml.tuning.results import study_json
-    from fogml.tuning.sweep import run_sweep
+    from fogml.tuning.sweep import run_sweep, study_json
 
     if not settings.runs:
         raise InputError("no training run is given; state 'runs' in the file, or --run")

@@ -32,10 +32,36 @@ from fogml.gap.result_parts import Nearest, WhatIf
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.where import GapOnRun, where
 from fogml.processes import one_thread
-from fogml.runs.epochs import with_epoch
 from fogml.runs.run import Run
 from fogml.twin.registry import effects
 from fogml.twin.twin import Twin
+
+
+def with_epoch(*groups: Sequence[Run]) -> tuple[list[Run], ...]:
+    """The groups of a unit's runs, each run with the fact `in_use_since`: the first start among all of them.
+
+    A run that states the fact keeps it; one that does not say when it started stays as it is.
+
+    Raises
+    ------
+    InputError
+        If only some of the starts have a time zone.
+    """
+    starts = [run.facts.started for group in groups for run in group if run.facts.started is not None]
+    if not starts:
+        return tuple(list(group) for group in groups)
+    try:
+        first = min(starts)
+    except TypeError:
+        raise InputError("'started' has a time zone in some of the runs only; add it") from None
+
+    def told(run: Run) -> Run:
+        if run.facts.started is None or run.facts.in_use_since is not None:
+            return run
+        return run.with_facts(run.facts.model_copy(update={"in_use_since": first}))
+
+    return tuple([told(run) for run in group] for group in groups)
+
 
 __all__ = ["diagnose"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import expit
 
 from fogml.arrays import FloatArray
-from fogml.gap.grids import Grids
+from fogml.gap.shapes import Grids
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Families of causes that follow a temperature, its rate or its past.
 
 Each generator gives a family's blocks on one run; `fogml.gap.catalogue` says whose they are, and
-`fogml.gap.grids` how closely they look.
+`fogml.gap.shapes` how closely they look.
 """
 
 from __future__ import annotations

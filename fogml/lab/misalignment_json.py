@@ -1,15 +1,118 @@
-"""What ``fogml lab misalignment`` tells, as the values of ``misalignment.json``."""
+"""What ``fogml lab misalignment`` tells, the classical test and one state alone beside it, as JSON values."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from fogml.lab.misalignment import TableMeasurements, decouple
+from fogml.errors import InputError
+from fogml.lab.misalignment import TableMeasurements, decouple, fit_state
 from fogml.lab.misalignment_errors import LEVEL
-from fogml.lab.misalignment_methods import compare_methods, relative_error_ppm
+from fogml.lab.misalignment_states import STATES
+
+_SAME_TILT_DEG = 0.05
+
+
+@dataclass(frozen=True)
+class Method:
+    """What one method says; None where it can't.
+
+    ``K`` in output per deg/s, angles in deg.
+    """
+
+    name: str
+    K: float | None
+    delta_x_deg: float | None
+    delta_y_deg: float | None
+    why: str
+
+
+def compare_methods(measured: TableMeasurements, cross_tilt: bool | None = None) -> tuple[Method, ...]:
+    """The classical test, single state and four states on the same measurements.
+
+    The classical test takes state 1 upright for K (cos d taken as 1) and the first state of each axis lying
+    at 90 deg for the misalignment (sin d taken as d), where the states are quarter turns; it sees the
+    fixture's zero error as misalignment. One state alone gives R = K sqrt(1 - a_y^2) for K and, with the
+    fixture's zero error in it, one angle.
+
+    Raises
+    ------
+    InputError
+        As `decouple`.
+    """
+    four = decouple(measured, cross_tilt)
+    alone = fit_state(measured, 1, four.cross_tilt)
+    cosine, sine = alone.coefficients[:2]
+    angle = float(np.degrees(np.arctan2(sine, cosine)))
+    along_x, along_y = _quarter_turn(measured, 1)
+    return (
+        _classical(measured),
+        Method(
+            "single state",
+            float(np.hypot(cosine, sine)),
+            along_x * angle if along_x else None,
+            along_y * angle if along_y else None,
+            "state 1 over its tilts; what lies across its tilt plane stays unseen",
+        ),
+        Method(
+            "four states",
+            four.K,
+            four.delta_x_deg,
+            four.delta_y_deg,
+            "opposite states tell the fixture's zero error from the gyro's",
+        ),
+    )
+
+
+def _classical(measured: TableMeasurements) -> Method:
+    why = "upright for K, lying for the misalignment, small angles"
+    k = _slope_at(measured, 1, 0.0)
+    if k is None:
+        return Method("classical test", None, None, None, f"{why}; no tilt 0 in state 1")
+    found: list[float | None] = [None, None]
+    for state in reversed(STATES):
+        slope = _slope_at(measured, state, 90.0)
+        for axis, sign in enumerate(_quarter_turn(measured, state)):
+            if sign and slope is not None:
+                found[axis] = float(np.degrees(sign * slope / k))
+    x, y = found
+    return Method("classical test", k, x, y, why if x is not None else f"{why}; no tilt 90 deg in state 1")
+
+
+def _quarter_turn(measured: TableMeasurements, state: int) -> tuple[int, int]:
+    """Signs of a_x and a_y along the fixture's x axis in a state; both 0 where it is no quarter turn."""
+    turn = np.radians(measured.state_angles_deg[state - 1])
+    along = np.array([np.cos(turn), np.sin(turn)])
+    whole = np.round(along)
+    if np.abs(along - whole).max() > np.radians(_SAME_TILT_DEG):
+        return 0, 0
+    return int(whole[0]), int(whole[1])
+
+
+def _slope_at(measured: TableMeasurements, state: int, tilt_deg: float) -> float | None:
+    """Slope over the table rate at one tilt, None where it was not measured."""
+    near = (measured.state == state) & (np.abs(measured.tilt_deg - tilt_deg) < _SAME_TILT_DEG)
+    rate, output = measured.rate_deg_s[near], measured.output[near]
+    if len(rate) == 0:
+        return None
+    centred = rate - rate.mean() if len(np.unique(rate)) > 1 else rate
+    return float(centred @ output / (centred @ centred))
+
+
+def relative_error_ppm(found: float | None, true: float) -> float | None:
+    """Error of a found value [ppm]; None where there is none.
+
+    Raises
+    ------
+    InputError
+        If the true value is zero.
+    """
+    if true == 0.0:
+        raise InputError("a true scale factor of 0 gives no relative error")
+    return None if found is None else 1e6 * (found / true - 1.0)
+
 
 SCHEMA = "fogml.misalignment/1"
 

@@ -10,7 +10,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.lab.north import Drift, DriftError, Scheme, drift_error, horizontal_rate
-from fogml.lab.north_positions import NorthFix, north_from_positions
+from fogml.lab.north_positions import north_from_positions
 from fogml.lab.north_schemes import (
     CoarseFine,
     Way,
@@ -60,7 +60,7 @@ def recorded_north_json(
         "drift_deg_h_per_h": fix.drift_deg_h_h,
         "quiet_azimuth_deg": list(error.quiet_deg),
         "worst_azimuth_deg": list(error.worst_deg),
-        "error_deg": _error_of_fix(fix),
+        "error_deg": None if fix.observed_deg is None else float(wrapped(fix.plain_deg - fix.observed_deg)),
         "se": fix.se_deg,
         "drift_se": fix.drift_se,
         "method": fix.method,
@@ -81,11 +81,6 @@ def recorded_north_json(
         # A column that no drift model uses is the very one that this procedure needs.
         "findings": [f.as_dict() for f in run.findings if f.code != "unknown_column"],
     }
-
-
-def _error_of_fix(fix: NorthFix) -> float | None:
-    """What the plain result is off by, as far as the linear drift tells."""
-    return None if fix.observed_deg is None else float(wrapped(fix.plain_deg - fix.observed_deg))
 
 
 def simulated_north_json(

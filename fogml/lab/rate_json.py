@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.lab.rate_bend import nonlinearity_within
+from fogml.lab.rate_errors import nonlinearity_within
 from fogml.lab.rate_pieces import Plateaus, find_oscillations, find_plateaus, merged
 from fogml.lab.rate_response import Gain, Slew, bandwidth, gain_of, slew
 from fogml.lab.rate_temperature import by_temperature, temperature_sensitivity

@@ -63,7 +63,7 @@ class Line:
         nothing is left over.
     nonlinearity_ppm, nonlinearity_ci90_ppm
         Greatest deviation of a rate's output from the line over the greatest output; None for fewer than
-        four rates. Its 90 % interval is `fogml.lab.rate_bend.nonlinearity_within`'s, which takes the run.
+        four rates. Its 90 % interval is `fogml.lab.rate_errors.nonlinearity_within`'s, which takes the run.
     asymmetry_ppm, asymmetry_ci90_ppm
         Scale factor of the positive rates less that of the negative ones, and its 90 % interval; None where
         one sense lacks.

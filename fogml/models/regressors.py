@@ -144,7 +144,7 @@ def parameter_count(regressor: Any) -> int:
         return int(count() if callable(count) else count)
     if hasattr(regressor, "to_saved"):
         return sum(array.size for array in regressor.to_saved()[1].values())
-    from fogml.models.sklearn_saving import numbers_of
+    from fogml.models.sklearn_compact import numbers_of
 
     return numbers_of(regressor)
 
@@ -152,7 +152,7 @@ def parameter_count(regressor: Any) -> int:
 def weight_bytes(regressor: Any) -> int:
     """Bytes of a fitted regressor's arrays; of a scikit-learn one, of those that it predicts from."""
     if _is_sklearn(regressor):
-        from fogml.models.sklearn_saving import bytes_of
+        from fogml.models.sklearn_compact import bytes_of
 
         return bytes_of(regressor)
     return sum(array.nbytes for array in regressor_to_saved(regressor)[1].values())
@@ -167,7 +167,7 @@ def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArra
         If it is neither fogml's, nor scikit-learn's, nor declared by an installed package.
     """
     if _is_sklearn(regressor):
-        from fogml.models.sklearn_saving import dump_sklearn
+        from fogml.models.sklearn_compact import dump_sklearn
 
         return {"form": SKOPS}, {"skops": dump_sklearn(regressor)}
     form = _form_among(FORMS, regressor)
@@ -195,7 +195,7 @@ def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]
     values = dict(values)
     form = values.pop("form", None)
     if form == SKOPS:
-        from fogml.models.sklearn_saving import load_sklearn
+        from fogml.models.sklearn_compact import load_sklearn
 
         if values:
             raise InputError(f"key {quoted('regressor.' + next(iter(values)))} does not belong there")

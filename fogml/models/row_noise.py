@@ -19,8 +19,8 @@ from fogml.processes import one_thread
 from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
+from fogml.signals.output_filters import SpectrumTerms, term_shapes
 from fogml.signals.restricted import absent_or_not, weighed_models
-from fogml.signals.spectrum_terms import SpectrumTerms, term_shapes
 from fogml.signals.whitening import Whitener
 
 _GAP = 1.5

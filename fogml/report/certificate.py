@@ -137,7 +137,7 @@ def _sheet(judgement: Judgement) -> Sheet:
         runs=_runs(shown),
         figures=_figures(worst),
         worst=worst.run,
-        synthetic=is_synthetic(judgement),
+        synthetic=any(run.facts.synthetic for run in (*judgement.train, *judgement.test)),
         more_runs=len(judgement.test) - len(shown),
         figure=figure,
         figure_words=words,
@@ -157,11 +157,6 @@ def _runs(runs: Sequence[RunJudgement]) -> Table:
         cells = (run.run, *(number(value) for value in (*values, run.floor)), percent(run.outside_training))
         rows.append(cells)
     return Table(columns, rows)
-
-
-def is_synthetic(judgement: Judgement) -> bool:
-    """Whether a run comes from a simulation."""
-    return any(run.facts.synthetic for run in (*judgement.train, *judgement.test))
 
 
 def _figures(run: RunJudgement) -> Table:

@@ -24,7 +24,7 @@ height of 360 px to the figure."""
 
 def distribution(fleet: Mapping[str, Any]) -> Drawing:
     """Rms before and after of all units, as cumulated shares, with the median floor."""
-    judged = _judged(fleet)
+    judged = [unit for unit in fleet["units"] if unit["after"] is not None]
     figure = go.Figure()
     shares = 100.0 * (np.arange(len(judged)) + 0.5) / len(judged)
     for key, name, colour, dash in (
@@ -166,10 +166,6 @@ def serial_axis(figure: go.Figure, labels: Sequence[str]) -> None:
         ticktext=words[::step],
         tickangle=-90 if len(labels) > 8 or max(map(len, words), default=0) > _LONGEST_LABEL // 2 else 0,
     )
-
-
-def _judged(fleet: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    return [unit for unit in fleet["units"] if unit["after"] is not None]
 
 
 def _label(unit: Mapping[str, Any]) -> str:

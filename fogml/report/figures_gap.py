@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from fogml.arrays import FloatArray
@@ -103,7 +102,7 @@ def run_in_time(series: RunSeries, segments: Sequence[GapSegment], named: bool) 
             figure.add_hline(y=value, row=row, col=1, line=style.FLOOR_LINE)
     figure.add_trace(style.floor_in_legend(), row=3, col=1)
     _mark_segments(figure, segments, per_unit, low + 0.96 * (high - low))
-    tinted = shade(figure, segments_of(time, regime_names(series)))
+    tinted = shade(figure, segments_of(time, np.asarray(Regimes.names)[series.regime]))
     words = {
         "temperature": "T [°C]",
         "output": "error [deg/h]",
@@ -119,11 +118,6 @@ def run_in_time(series: RunSeries, segments: Sequence[GapSegment], named: bool) 
         alt=_time_alt(series, segments, named),
         caption=_time_caption(series, segments, named, off_panel, [regime_word(name) for name in tinted]),
     )
-
-
-def regime_names(series: RunSeries) -> NDArray[np.str_]:
-    """The regime of each average by name, shape (k,)."""
-    return np.asarray(Regimes.names)[series.regime]
 
 
 def _rms(values: FloatArray) -> float:

@@ -1,17 +1,174 @@
-"""The page of ``fogml plan``."""
+"""The page of ``fogml plan``: what each run does over time, and the expected standard errors."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
+import plotly.graph_objects as go
+
 from fogml.gap.result_parts import Rehearsed
-from fogml.report.figures_plan import errors_drawing, programme_drawing
+from fogml.report import style
 from fogml.report.gap_tables_ahead import rehearsal_table
-from fogml.report.page import Tile, render
+from fogml.report.page import Drawing, Tile, render
+from fogml.report.style import log_axis, time_unit
 from fogml.report.tables import Row, Table, columns_of
-from fogml.report.words import MISSING, listed, number, plural, stated
+from fogml.report.words import MISSING, duration, listed, number, plural, stated
 from fogml.twin.registry import effects
+
+_SWITCHES = ("power", "fan", "compressor")
+
+
+def programme_drawing(run: Mapping[str, Any]) -> Drawing:
+    """Temperatures, table rate and switches of a planned run over time."""
+    profile = run["profile"]
+    turned = any(profile["table_rate"]["value"])
+    switched = [what for what in (*_SWITCHES, "yaw") if what in profile]
+    rows = ["temperature", *(["table"] if turned else []), *(["switches"] if switched else [])]
+    figure = style.stacked([2.0, *[1.0] * (len(rows) - 1)], 0.05)
+    total_s = 3600.0 * run["hours"]
+    per_unit, unit = time_unit(total_s)
+    set_point, coil = profile["set_point"], profile["coil"]
+    _line(figure, 1, set_point, per_unit, "set point", style.BLUE, "solid")
+    _line(figure, 1, coil, per_unit, "coil, expected", style.VERMILION, "dot")
+    figure.update_yaxes(title_text="temperature [°C]", row=1, col=1)
+    if turned:
+        place = rows.index("table") + 1
+        # Rates span five decades of either sign: a symmetrical logarithm shows them all.
+        signed = {
+            "time_s": profile["table_rate"]["time_s"],
+            "value": [_symmetrical(rate) for rate in profile["table_rate"]["value"]],
+        }
+        _line(figure, place, signed, per_unit, "table rate", style.BLACK, "solid", legend=False)
+        ticks = (-100.0, -1.0, -0.01, 0.0, 0.01, 1.0, 100.0)
+        figure.update_yaxes(
+            title_text="table [deg/s]",
+            tickmode="array",
+            tickvals=[_symmetrical(rate) for rate in ticks],
+            ticktext=[f"{rate:g}".replace("-", "−") for rate in ticks],
+            row=place,
+            col=1,
+        )
+    if switched:
+        place = rows.index("switches") + 1
+        for level, what in enumerate(switched):
+            _bar(figure, place, profile[what], what, level, total_s, per_unit)
+        figure.update_yaxes(
+            tickmode="array",
+            tickvals=list(range(len(switched))),
+            ticktext=[_named(what) for what in switched],
+            range=[-0.6, len(switched) - 0.4],
+            row=place,
+            col=1,
+        )
+    figure.update_xaxes(range=[0.0, total_s / per_unit])
+    figure.update_xaxes(title_text=f"time [{unit}]", row=len(rows), col=1)
+    style.styled(figure, 200 + 150 * len(rows), legend={"y": 1.03})
+    low, high = min(set_point["value"]), max(set_point["value"])
+    done = [_named(what) for what in switched]
+    return Drawing(
+        figure,
+        alt=(
+            f"{duration(total_s)} between {number(low)} and {number(high)} °C: {run['summary']}."
+            + (f" Bars show {listed(done)}." if done else "")
+        ),
+        caption="Coil: expected from the twin's thermal plant. "
+        + (
+            "Bars: while it is so." if switched else "The unit is on, the fan runs, the fixture is not yawed."
+        ),
+    )
+
+
+def errors_drawing(values: Mapping[str, Any]) -> Drawing | None:
+    """Expected standard errors as shares of usual size or prior; None where nothing is wanted."""
+    shares = [(e["name"], e["se"] / _size(e)) for e in values["wanted"] if e["se"] and _size(e)]
+    if not shares:
+        return None
+    names, sizes = [name for name, _ in shares], [share for _, share in shares]
+    figure = go.Figure(
+        go.Scatter(
+            x=sizes,
+            y=names,
+            mode="markers",
+            marker={"symbol": "diamond", "size": 11, "color": style.BLUE},
+            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
+        )
+    )
+    figure.add_vline(x=1.0, line=style.FLOOR_LINE)
+    figure.update_xaxes(
+        title_text="expected standard error / prior or usual size",
+        **log_axis(min([*sizes, 0.5]), max([*sizes, 2.0])),
+    )
+    figure.update_yaxes(autorange="reversed", type="category")
+    style.styled(figure, 130 + 34 * len(names), showlegend=False)
+    return Drawing(
+        figure,
+        alt="Expected standard error over prior or usual size: "
+        + "; ".join(f"{name} {number(share)}" for name, share in shares)
+        + ".",
+        caption="Left of the dashed line a parameter is known better than before, or than its usual size.",
+    )
+
+
+def _size(error: Mapping[str, Any]) -> float:
+    return float(error["prior_se"] if error["prior_se"] is not None else abs(error["usual"]))
+
+
+def _symmetrical(rate: float) -> float:
+    return math.copysign(math.log10(1.0 + abs(rate) / 1e-3), rate)
+
+
+def _named(what: str) -> str:
+    return {"power": "power on", "fan": "fan on", "compressor": "compressor off", "yaw": "yawed"}[what]
+
+
+def _line(
+    figure: go.Figure,
+    row: int,
+    series: Mapping[str, Any],
+    per_unit: float,
+    name: str,
+    colour: str,
+    dash: str,
+    legend: bool = True,
+) -> None:
+    trace = go.Scatter(
+        x=[time / per_unit for time in series["time_s"]],
+        y=series["value"],
+        mode="lines",
+        name=name,
+        line={"color": colour, "dash": dash, "width": 1.8},
+        showlegend=legend,
+    )
+    figure.add_trace(trace, row=row, col=1)
+
+
+def _bar(
+    figure: go.Figure,
+    row: int,
+    series: Mapping[str, Any],
+    what: str,
+    level: int,
+    total_s: float,
+    per_unit: float,
+) -> None:
+    """Stretches in which a switch is on, the compressor off, or the fixture turned."""
+    times = [*series["time_s"], total_s]
+    xs: list[float | None] = []
+    for start, stop, value in zip(times, times[1:], series["value"]):
+        shown = value == 0.0 if what == "compressor" else bool(value)
+        if shown and stop > start:
+            xs += [start / per_unit, stop / per_unit, None]
+    trace = go.Scatter(
+        x=xs,
+        y=[None if x is None else level for x in xs],
+        mode="lines",
+        line={"color": style.SERIES[level], "width": 9},
+        name=_named(what),
+        showlegend=False,
+    )
+    figure.add_trace(trace, row=row, col=1)
 
 
 def plan_page(values: Mapping[str, Any]) -> str:

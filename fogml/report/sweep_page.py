@@ -2,17 +2,177 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fogml.report import figures_judgement
-from fogml.report.figures_sweep import history, importance_bars, pareto_front
-from fogml.report.page import Tile, render
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from fogml.report import figures_judgement, style
+from fogml.report.page import Drawing, Tile, render
+from fogml.report.style import log_axis
 from fogml.report.tables import Row, Table, columns_of, metrics_table
 from fogml.report.verdict import worst_run
 from fogml.report.words import MISSING, averages, number, plural
-from fogml.tuning.references import DEFAULT
+from fogml.tuning.winner import DEFAULT
 from fogml.validation.results import Judgement
+
+_COSTS = {"bytes": "weights [byte]", "operations": "operations per sample"}
+_MOST_PARAMETERS = 12
+
+
+def history(study: Mapping[str, Any]) -> Drawing:
+    """Held-out rms of each trial in the order begun, the best so far, and where trials were pruned."""
+    trials = study["trials"]
+    whole = [trial for trial in trials if trial["state"] == "complete"]
+    pruned = [trial["number"] for trial in trials if trial["state"] == "pruned"]
+    numbers, errors = [t["number"] for t in whole], np.array([t["rms"] for t in whole])
+    figure = go.Figure()
+    for place, model in enumerate(sorted({trial["model"] for trial in whole})):
+        own = [trial for trial in whole if trial["model"] == model]
+        marker = {
+            "symbol": style.MARKERS[place % len(style.MARKERS)],
+            "size": 8,
+            "color": style.SERIES[place % len(style.SERIES)],
+        }
+        figure.add_scatter(
+            x=[t["number"] for t in own],
+            y=[t["rms"] for t in own],
+            mode="markers",
+            name=model,
+            marker=marker,
+            text=[t["features"] for t in own],
+        )
+    best = np.minimum.accumulate(errors)
+    figure.add_scatter(
+        x=numbers,
+        y=best,
+        mode="lines",
+        name="best so far",
+        line={"color": style.BLACK, "width": 1.5, "shape": "hv"},
+    )
+    low, high = float(errors.min()), float(errors.max())
+    axis = log_axis(low, max(high, 1.02 * low), room=0.12)
+    if pruned:
+        figure.add_scatter(
+            x=pruned,
+            y=[10.0 ** (axis["range"][0] + 0.03 * (axis["range"][1] - axis["range"][0]))] * len(pruned),
+            mode="markers",
+            name="pruned or refused",
+            marker={"symbol": "line-ns-open", "size": 9, "color": style.PURPLE},
+        )
+    figure.update_xaxes(title_text="trial")
+    figure.update_yaxes(title_text="held-out rms [deg/h], logarithmic", **axis)
+    style.styled(figure, 400)
+    return Drawing(
+        figure,
+        alt=f"Held-out rms of {plural(len(whole), 'trial')}; the best has {number(low)} deg/h.",
+        caption=(
+            f"Each trial's rms on held-out {study['folds']}, single averaged rows, so noise is in it. "
+            "Ticks below: trials that were pruned or could not be fitted."
+        ),
+    )
+
+
+def importance_bars(study: Mapping[str, Any]) -> Drawing | None:
+    """Share of each parameter in what the error varies by; None where too few trials tell."""
+    shares = dict(list(study["importance"].items())[:_MOST_PARAMETERS])
+    if not shares:
+        return None
+    figure = go.Figure(
+        go.Bar(
+            x=[100.0 * share for share in shares.values()],
+            y=list(shares),
+            orientation="h",
+            marker={"color": style.SKY_BLUE},
+            text=[f"\u2002{100.0 * share:.0f} %" for share in shares.values()],
+            textposition="outside",
+            cliponaxis=False,
+        )
+    )
+    figure.update_xaxes(title_text="share of the error's variation [%]", range=[0, 105])
+    figure.update_yaxes(autorange="reversed", showgrid=False)
+    style.styled(figure, 110 + 30 * len(shares), bargap=0.35)
+    told = "; ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items())
+    return Drawing(
+        figure,
+        alt=f"What the held-out error varies by: {told}.",
+        caption=(
+            "By a random forest of the whole trials: how much worse it foretells the logarithm of the error "
+            "when a parameter's values are exchanged among trials."
+        ),
+    )
+
+
+def pareto_front(study: Mapping[str, Any]) -> Drawing:
+    """Held-out rms against weights and against operations, the Pareto set joined, the winner marked."""
+    trials = [trial for trial in study["trials"] if trial["state"] == "complete"]
+    front = [study["trials"][place] for place in study["pareto"]]
+    best = study["winner"]
+    figure = make_subplots(rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.04)
+    for column, (cost, title) in enumerate(_COSTS.items(), start=1):
+        shown = column == 1
+        _points(figure, trials, cost, column, shown)
+        figure.add_scatter(
+            x=[t[cost] for t in front],
+            y=[t["rms"] for t in front],
+            mode="markers",
+            name="in the Pareto set",
+            marker={"symbol": "diamond", "size": 10, "color": style.BLUE},
+            text=[f"{t['model']}: {t['features']}" for t in front],
+            showlegend=shown,
+            row=1,
+            col=column,
+        )
+        figure.add_scatter(
+            x=[best[cost]],
+            y=[best["rms"]],
+            mode="markers",
+            name="winner",
+            marker=style.ring(18),
+            showlegend=shown,
+            row=1,
+            col=column,
+        )
+        values = [max(t[cost], 1) for t in trials]
+        figure.update_xaxes(
+            title_text=f"{title}, logarithmic",
+            **log_axis(min(values), max(*values, 1.2 * min(values)), room=0.1),
+            row=1,
+            col=column,
+        )
+    errors = [trial["rms"] for trial in trials]
+    axis = log_axis(min(errors), max(*errors, 1.02 * min(errors)), room=0.12)
+    figure.update_yaxes(**axis)
+    figure.update_yaxes(title_text="held-out rms [deg/h], logarithmic", row=1, col=1)
+    style.styled(figure, 420)
+    named = ", ".join(objective["name"] for objective in study["objectives"])
+    return Drawing(
+        figure,
+        alt=f"Held-out rms against size and operations; {plural(len(front), 'trial')} in the Pareto set.",
+        caption=(
+            f"Pareto set: trials that no other is at least as good as in every objective ({named}). The "
+            "winner is the default, or the best of those that beat it beyond noise."
+        ),
+    )
+
+
+def _points(
+    figure: go.Figure, trials: Sequence[Mapping[str, Any]], cost: str, column: int, shown: bool
+) -> None:
+    figure.add_scatter(
+        x=[max(t[cost], 1) for t in trials],
+        y=[t["rms"] for t in trials],
+        mode="markers",
+        name="other trials",
+        marker={"symbol": "circle", "size": 6, "color": "#9AA1AA"},
+        text=[f"{t['model']}: {t['features']}" for t in trials],
+        showlegend=shown,
+        row=1,
+        col=column,
+    )
+
 
 _MOST_ROWS = 30
 

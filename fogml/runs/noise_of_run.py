@@ -26,7 +26,7 @@ from fogml.signals import large
 from fogml.signals.allan import AllanResult, allan_deviation
 from fogml.signals.averages import block_averages
 from fogml.signals.noise_terms import NoiseTerms, noise_terms
-from fogml.signals.stationarity import stationarity
+from fogml.signals.whiteness import stationarity
 
 SCHEMA = "fogml.noise/1"
 MOVING_DEGC = 0.5

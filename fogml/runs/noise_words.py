@@ -15,7 +15,7 @@ from fogml.runs.run import Run
 from fogml.runs.steps import recorded_step
 from fogml.signals.distributions import chi2_sf
 from fogml.signals.noise_terms import NoiseTerms
-from fogml.signals.stationarity import Stationarity
+from fogml.signals.whiteness import Stationarity
 
 DOUBT = 1e-3
 """Chance of a warning that a right model, or a steady run, gets."""

@@ -15,11 +15,10 @@ from fogml.errors import InputError
 from fogml.runs.columns import column_spec, is_accepted, parse_header
 from fogml.runs.container_files import groups_of, sheet_file
 from fogml.runs.csv_dialect import decoded_head
-from fogml.runs.csv_header import fields_of, is_number_like
+from fogml.runs.csv_header import fields_of, is_number_like, labview_header
 from fogml.runs.csv_numbers import PLAIN, Marks, marks_of, number
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.header_spelling import canonical_cells, with_units_below
-from fogml.runs.labview_header import labview_header
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.runs.reader_process import stored_file
 from fogml.runs.reading import file_format

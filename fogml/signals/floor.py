@@ -24,11 +24,10 @@ from fogml.errors import InputError
 from fogml.intervals import MEDIAN_SIZE, Z90
 from fogml.signals import large
 from fogml.signals.allan import Segments, segment_bounds
-from fogml.signals.averages import block_averages
-from fogml.signals.averages_noise import FastNoise, averages_variance, fast_noise
+from fogml.signals.averages import FastNoise, averages_variance, block_averages, fast_noise
 from fogml.signals.noise_spectrum import Rows, spectrum_of
+from fogml.signals.output_filters import SpectrumTerms
 from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel
-from fogml.signals.spectrum_terms import SpectrumTerms
 
 _SPIKE = 8.0
 """A sample, or a step of the sub-averages, further than this many standard deviations is no noise."""

@@ -10,9 +10,8 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.signals.distributions import chi2_sf
 from fogml.signals.noise_spectrum import Spectrum
-from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, OutputFilter
+from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, OutputFilter, SpectrumTerms
 from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel
-from fogml.signals.spectrum_terms import SpectrumTerms
 
 PLAIN = SpectrumTerms()
 BEHIND = SpectrumTerms(("N", "B", "K", "Q", "W"))

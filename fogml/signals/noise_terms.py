@@ -16,8 +16,8 @@ from fogml.signals.allan import AllanResult, allan_deviation
 from fogml.signals.noise_ramp import ramp
 from fogml.signals.noise_search import NoiseSearch, search_noise
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
+from fogml.signals.output_filters import AFTER, term_shapes
 from fogml.signals.spectrum_fit import SpectrumFit
-from fogml.signals.spectrum_terms import AFTER, term_shapes
 
 TermName = Literal["Q", "N", "B", "K", "R"]
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.signals.noise_spectrum import Spectrum
-from fogml.signals.output_filters import NO_FILTER, OutputFilter
-from fogml.signals.spectrum_terms import AFTER, SpectrumTerms, term_shapes
+from fogml.signals.output_filters import AFTER, NO_FILTER, OutputFilter, SpectrumTerms, term_shapes
 
 _TOLERANCE = 1e-7
 _ROUNDED = 1e-13

@@ -12,19 +12,17 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.testing.effect_amplitudes import (
+from fogml.testing.effect_inputs import (
+    BLOCK_EDGES,
+    SCRAMBLED,
+    block,
     check_amplitude,
     hooks,
     in_block,
     rms,
     same,
-    signature,
-)
-from fogml.testing.effect_inputs import (
-    BLOCK_EDGES,
-    SCRAMBLED,
-    block,
     scrambled,
+    signature,
     standard_inputs,
     still_stretch,
     without_rows,

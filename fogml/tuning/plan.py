@@ -44,7 +44,7 @@ class Plan:
     folder
         Where results go.
     references
-        Choices tried first, by name; None for those of `fogml.tuning.references.reference_choices`.
+        Choices tried first, by name; None for those of `fogml.tuning.winner.reference_choices`.
     heartbeat_s
         A trial whose worker has not been heard of for three times this long is tried again [s].
     """

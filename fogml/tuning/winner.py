@@ -1,4 +1,4 @@
-"""What a study found: the Pareto set, the winner, and what mattered."""
+"""What a study found: the Pareto set, the winner against what every sweep tries first, and what mattered."""
 
 from __future__ import annotations
 
@@ -9,12 +9,41 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.tuning.references import DEFAULT
+from fogml.models.auto import AutoModel
+from fogml.models.names import make_model
+from fogml.runs.run import Run
+from fogml.tuning.space import Choice
 from fogml.tuning.study import place_of
 from fogml.tuning.worker import score_of
 
 if TYPE_CHECKING:
     from optuna.trial import FrozenTrial
+
+
+DEFAULT, AUTO = "default", "auto"
+
+
+def reference_choices(runs: Sequence[Run], seed: int = 0) -> dict[str, Choice]:
+    """The choices that a sweep's winner is held against, by name.
+
+    Parameters
+    ----------
+    runs
+        Training runs.
+    seed
+        Seed of the networks.
+
+    Raises
+    ------
+    InputError
+        If the runs don't belong together, lack a temperature, or are too short.
+    """
+    features = make_model("polynomial", None, seed).get_params()["features"]
+    made = AutoModel(seed=seed).fit(runs).weighed_
+    return {
+        DEFAULT: Choice("polynomial", str(features), {}),
+        AUTO: Choice("auto", ", ".join(made.model.feature_names), {}, made),
+    }
 
 
 def complete(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:

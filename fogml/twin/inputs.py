@@ -12,7 +12,7 @@ import numpy as np
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
-from fogml.signals.sample_means import mean_cosine, with_whole_turns
+from fogml.signals.averages import mean_cosine, with_whole_turns
 from fogml.twin.attitude import Attitude, attitude, earth_rate, turned
 from fogml.twin.memory import Memory
 from fogml.twin.optics import REFERENCE_COIL, Coil, Light
@@ -179,7 +179,7 @@ class Inputs:
         """
         if not self.hindsight:
             return self.memory.rate(key, self.time, values, self.rate_window_s)
-        from fogml.signals.centred_rate import centred_rate
+        from fogml.signals.smoothing import centred_rate
 
         return 60.0 * centred_rate(self.time, values, self.rate_window_s)
 

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fogml.app.jobs import Jobs
-from fogml.app.runner import PROCESS
+from fogml.app.jobs import PROCESS, Jobs
 from fogml.errors import InputError
 
 ENDLESS = ["app", "endless", "--port", "0"]
@@ -43,7 +42,7 @@ def test_a_job_goes_on_without_its_server_and_is_found_again(tmp_path: Path) -> 
     # Once it has begun, nobody begins it again.
     began = (tmp_path / "jobs" / "0001" / PROCESS).stat().st_mtime_ns
     again = subprocess.run(
-        [sys.executable, "-m", "fogml.app.runner", str(tmp_path / "jobs" / "0001")], check=True
+        [sys.executable, "-m", "fogml.app.jobs", str(tmp_path / "jobs" / "0001")], check=True
     )
     assert again.returncode == 0
     assert (tmp_path / "jobs" / "0001" / PROCESS).stat().st_mtime_ns == began

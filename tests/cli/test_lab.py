@@ -13,7 +13,7 @@ from fogml.errors import InputError
 from fogml.lab.misalignment_simulation import TableUnit, measurements
 from fogml.lab.north import Drift, Scheme
 from fogml.lab.north_positions import north_from_positions
-from fogml.lab.north_simulation import simulated_positions
+from fogml.lab.north_schemes import simulated_positions
 from fogml.runs.run import Run
 
 MISALIGNMENT_KEYS = ("K", "delta_x_deg", "delta_y_deg", "delta_deg", "fixture_error_deg", "se")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.causes import cards_of, onset
-from fogml.gap.diagnosis import _closed_share
+from fogml.gap.diagnosis import _closed_share, with_epoch
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import infer
 from fogml.gap.model import TwinModel
@@ -17,7 +17,6 @@ from fogml.gap.posterior import _likeliest, judge
 from fogml.gap.scene import Scene
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.unknown import unknown_families
-from fogml.runs.epochs import with_epoch
 from fogml.signals.bases import decayed
 from fogml.twin.twin_file import load_twin
 from tests.gap.test_answer import _run

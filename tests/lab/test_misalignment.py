@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements, _cross_tilt_angle, _slopes, decouple
-from fogml.lab.misalignment_methods import compare_methods, relative_error_ppm
+from fogml.lab.misalignment_json import compare_methods, relative_error_ppm
 from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
 

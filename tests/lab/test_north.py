@@ -10,8 +10,15 @@ from hypothesis import strategies as st
 from fogml.errors import InputError
 from fogml.lab.north import PALINDROME, Drift, Scheme, drift_error, horizontal_rate
 from fogml.lab.north_positions import north_from_positions
-from fogml.lab.north_schemes import CoarseFine, error_of, seek, standard_error, ways_of_equal_time, wrapped
-from fogml.lab.north_simulation import simulated_positions
+from fogml.lab.north_schemes import (
+    CoarseFine,
+    error_of,
+    seek,
+    simulated_positions,
+    standard_error,
+    ways_of_equal_time,
+    wrapped,
+)
 
 LINEAR = Drift(0.18)
 START_UP = Drift(0.05, ((0.2, 600.0), (-0.1, 90.0)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.lab.rate_bend import greatest_within
+from fogml.lab.rate_errors import greatest_within
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_words import result_rows
 from fogml.runs.facts import Facts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.monitor.trend import trend_quantiles
+from fogml.monitor.watch import trend_quantiles
 
 AGE = 30.0 * np.arange(14.0)
 

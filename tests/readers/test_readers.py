@@ -258,7 +258,7 @@ def test_messages_of_mcap_come_in_the_order_of_their_times(tmp_path):
     from mcap.reader import make_reader
     from mcap.writer import Writer
 
-    from fogml.readers import mcap_chunks
+    from fogml.readers import messages
 
     rng, path = np.random.default_rng(3), tmp_path / "log.mcap"
     with path.open("wb") as file:
@@ -274,7 +274,7 @@ def test_messages_of_mcap_come_in_the_order_of_their_times(tmp_path):
         right = [(m.log_time, m.channel_id, m.data) for _, _, m in reader.iter_messages(topics=["/a", "/c"])]
         chunks = reader.get_summary().chunk_indexes
         assert len(chunks) > 20 and len(right) > 200
-        found = list(mcap_chunks.messages(file, chunks, (channels[0], channels[2])))
+        found = list(messages.messages(file, chunks, (channels[0], channels[2])))
     assert [time for time, *_ in found] == [time for time, *_ in right]
     assert sorted(found) == sorted(right)
 

@@ -22,10 +22,10 @@ from fogml.report.figures_judgement import (
     rms_by_regime,
 )
 from fogml.report.figures_noise import term_deviation
-from fogml.report.figures_plan import programme_drawing
 from fogml.report.index_page import loop_between, loops
 from fogml.report.inspect_page import temperature_rates
 from fogml.report.page import Drawing
+from fogml.report.plan_page import programme_drawing
 from fogml.report.style import segments_of, shade
 from fogml.runs.run import Run
 from fogml.static_svg import Curve, line_figure

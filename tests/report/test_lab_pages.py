@@ -14,7 +14,7 @@ from fogml.lab.misalignment_simulation import TableUnit, measurements
 from fogml.lab.navigation import navigation_costs
 from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
-from fogml.lab.north_simulation import simulated_positions
+from fogml.lab.north_schemes import simulated_positions
 from fogml.report import misalignment_page, north_page, train_page
 from fogml.report.misalignment_page import slopes_over_tilts
 from tests.report.judgements import judgement

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
-from fogml.runs.csv_quotes import quotes_are_plain
+from fogml.runs.csv_files import quotes_are_plain
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.logger_lines import hide_quoted, shown
 from fogml.runs.reading import read_blocks, read_run

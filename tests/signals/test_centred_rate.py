@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.signals.centred_rate import centred_rate
+from fogml.signals.smoothing import centred_rate
 
 
 @pytest.mark.parametrize("window_s", [0.0, 1.0, 64.0, 63.3])

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from fogml.errors import InputError
-from fogml.signals.averages_noise import FastNoise, averages_variance
+from fogml.signals.averages import FastNoise, averages_variance
 from fogml.signals.flicker import Flicker
 from fogml.signals.floor import noise_floor, quiet_parts, realised_noise_floor
 from fogml.signals.noise_expectation import floor_square

@@ -8,9 +8,8 @@ from scipy.optimize import minimize
 
 from fogml.arrays import FloatArray
 from fogml.signals.noise_spectrum import spectrum_of
-from fogml.signals.output_filters import LOW_PASSES, OutputFilter
+from fogml.signals.output_filters import LOW_PASSES, OutputFilter, SpectrumTerms, term_shapes
 from fogml.signals.spectrum_fit import SpectrumModel
-from fogml.signals.spectrum_terms import SpectrumTerms, term_shapes
 
 
 @pytest.mark.parametrize("low_pass", LOW_PASSES, ids=str)

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import f_oneway
 
-from fogml.signals.stationarity import _by_parts, stationarity
+from fogml.signals.whiteness import _by_parts, stationarity
 
 
 def test_steady_noise_of_any_colour_passes():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.runs.epochs import with_epoch
+from fogml.gap.diagnosis import with_epoch
 from fogml.runs.facts import Facts
 from fogml.twin.between_runs import Storage, storage_times
 from fogml.twin.effect import NoiseEffect, SensorEffect, ThermalEffect

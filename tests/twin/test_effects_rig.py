@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from fogml.arrays import FloatArray
 from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
-from fogml.signals.sample_means import mean_cosine
+from fogml.signals.averages import mean_cosine
 from fogml.twin.effects.rig import InputAxisMisalignment, scale_factor_loss_ppm
 from fogml.twin.inputs import Inputs
 from fogml.twin.registry import effect

@@ -53,8 +53,8 @@ class Demands:
 _WIDE = 5.0
 
 
-def _within(rng: np.random.Generator, low: float, high: float) -> float:
-    if low > 0.0 and high / low >= _WIDE:
+def _within(rng: np.random.Generator, low: float, high: float, evenly: bool) -> float:
+    if low > 0.0 and high / low >= _WIDE and not evenly:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
     return float(rng.uniform(low, high))
 
@@ -92,6 +92,8 @@ class Form(ABC):
         Whether the unit must be light.
     ranges
         Lowest and highest value of each shape parameter, for those that `draw` draws one by one.
+    evenly
+        Those of them that are drawn evenly, however wide their range is.
     largest
         Amplitude beyond which no gyro has it; where it would take more to show, the unit can't show it.
     """
@@ -110,11 +112,12 @@ class Form(ABC):
     horizontal: ClassVar[bool] = False
     quick_plant: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
+    evenly: ClassVar[tuple[str, ...]] = ()
     largest: ClassVar[float] = np.inf
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Shape parameters: over `ranges`, evenly in the logarithm where a range spans a factor of 5."""
-        return {name: _within(rng, low, high) for name, (low, high) in self.ranges.items()}
+        return {name: _within(rng, *ends, name in self.evenly) for name, ends in self.ranges.items()}
 
 
 class Additive(Form):

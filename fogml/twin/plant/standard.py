@@ -143,7 +143,7 @@ def join(network: ThermalNetwork, node: str, onto: str) -> ThermalNetwork:
 
 
 def _full(c: ThermalConstants, coil_nodes: int, order: int) -> ThermalNetwork:
-    coil = coil_names(coil_nodes)
+    coil = ("T_out", *(f"T_coil_{i}" for i in range(2, coil_nodes)), "T_in")
     # Faces stand for half a layer each, as in the trapezoid rule.
     weights = np.full(coil_nodes, 1.0)
     weights[[0, -1]] = 0.5
@@ -177,11 +177,6 @@ def _full(c: ThermalConstants, coil_nodes: int, order: int) -> ThermalNetwork:
     capacities |= {"T_hub": c.hub_capacity, "T_electronics": c.electronics_capacity}
     capacities["T_plate"] = c.plate_capacity
     return ThermalNetwork(capacities, links, {"T_leads": LEADS})
-
-
-def coil_names(count: int) -> tuple[str, ...]:
-    """Names of the coil's nodes from the outer to the inner face."""
-    return ("T_out", *(f"T_coil_{i}" for i in range(2, count)), "T_in")
 
 
 # Every constant has its quantity, so that none goes unchecked.

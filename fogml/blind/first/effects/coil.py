@@ -24,10 +24,8 @@ class WarmupStretched(Additive):
     """A stretched exponential of the time since power-on."""
 
     name, form, demands = "warmup_bias", "stretched exponential", Demands(power_on=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Time constant and exponent."""
-        return {"time_constant": rng.uniform(300.0, 1500.0), "exponent": rng.uniform(0.6, 0.9)}
+    ranges = {"time_constant": (300.0, 1500.0), "exponent": (0.6, 0.9)}
+    evenly = ("time_constant",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """exp(-(t / tau)**beta)."""
@@ -104,11 +102,9 @@ class Leads(Additive):
     name, form = "pigtail_shupe", "leads past hub and case"
     records, fine_sensors = ("T_electronics", "T_case"), True
     demands = Demands(power_steps=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Ratio of the lengths, share of the hub in what the first lead feels, lag of its jacket [s]."""
-        ratio, share = rng.uniform(0.3, 2.0), rng.uniform(0.0, 0.03)
-        return {"length_ratio": ratio, "hub_share": share, "jacket": rng.uniform(10.0, 40.0)}
+    ranges = {"length_ratio": (0.3, 2.0), "hub_share": (0.0, 0.03), "jacket": (10.0, 40.0)}
+    """Ratio of the lengths, share of the hub in what the first lead feels, lag of its jacket [s]."""
+    evenly = ("length_ratio",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """n c_T (l_1 (dT_1/dt - dT_coil/dt) - l_2 (dT_case/dt - dT_coil/dt)) / D."""
@@ -138,10 +134,9 @@ class SlipEvents(Additive):
 
     name, form = "thermal_shock", "single slips of random height"
     demands, quick_plant = Demands(shock=True), True
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Threshold and time of creeping back."""
-        return {"threshold": rng.uniform(3.0, 5.0), "time_constant": rng.uniform(1800.0, 36000.0)}
+    ranges = {"threshold": (3.0, 5.0), "time_constant": (1800.0, 36000.0)}
+    """Threshold and time of creeping back."""
+    evenly = ("time_constant",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Relaxing sum of slips: as many as chance has it, gamma distributed in height."""

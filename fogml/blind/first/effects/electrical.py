@@ -28,11 +28,7 @@ class BiasCurve(Additive):
     """Static bias of third to sixth order."""
 
     name, form, unit = "bias_polynomial", "orders three to six", "deg/h"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Ratios of the higher orders to the third."""
-        ratios = {"quartic_ratio": rng.uniform(-1.0, 1.0), "quintic_ratio": rng.uniform(-1.0, 1.0)}
-        return ratios | {"sixth_ratio": rng.uniform(-0.1, 0.1)}
+    ranges = {"quartic_ratio": (-1.0, 1.0), "quintic_ratio": (-1.0, 1.0), "sixth_ratio": (-0.1, 0.1)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """v**3 + r4 v**4 + r5 v**5 + r6 v**6 with v = u / 50."""
@@ -46,10 +42,9 @@ class MachinePickup(Additive):
 
     name, form, unit = "chamber_pickup", "bent over the duty", "deg/h"
     records = ("heater", "compressor")
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Exponent over the duty, delay [s]."""
-        return {"exponent": rng.uniform(0.95, 1.05), "delay": rng.uniform(0.5, 3.0)}
+    ranges = {"exponent": (0.95, 1.05), "delay": (0.5, 3.0)}
+    """Exponent over the duty, delay [s]."""
+    evenly = ("delay",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """heater**p + compressor, lagged."""
@@ -63,14 +58,9 @@ class FieldBent(Additive):
     name, form, unit = "magnetic", "shield that saturates", "deg/h/G"
     records = ("B_x", "B_y", "B_z")
     demands = Demands(slow_turns=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Direction, ratio of the axial part, bend of the shield over the field."""
-        return {
-            "phase": rng.uniform(0.0, 360.0),
-            "axial_ratio": rng.uniform(0.1, 0.5),
-            "bend": rng.uniform(0.0, 0.05),
-        }
+    ranges = {"phase": (0.0, 360.0), "axial_ratio": (0.1, 0.5), "bend": (0.0, 0.05)}
+    """Direction, ratio of the axial part, bend of the shield over the field."""
+    evenly = ("axial_ratio",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """B / (1 - bend B / 50 uT) of the field along the sensitive direction [G]."""
@@ -86,14 +76,9 @@ class SupplyTriangle(Additive):
     name, form, unit = "supply_ripple", "triangular ripple", "deg/h/V"
     records = ("supply",)
     demands = Demands(power_steps=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Size of the ripple, its alias, its phase."""
-        return {
-            "ripple": rng.uniform(0.05, 0.5),
-            "alias_frequency": float(np.exp(rng.uniform(np.log(1e-4), np.log(1e-2)))),
-            "phase": rng.uniform(0.0, 360.0),
-        }
+    ranges = {"ripple": (0.05, 0.5), "alias_frequency": (1e-4, 1e-2), "phase": (0.0, 360.0)}
+    """Size of the ripple, its alias, its phase."""
+    evenly = ("ripple",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """V - V_0 + a triangle(t)."""

@@ -32,11 +32,8 @@ class IntegratorResets(Additive):
     """An integrator that winds up and is reset: a saw-tooth in time."""
 
     name, known, stage, form = "integrator_resets", False, "loop", "saw-tooth in time"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Period [s], phase, growth of the period per hour."""
-        period = rng.uniform(2000.0, 6000.0)
-        return {"period": period, "phase": rng.random(), "growth": rng.uniform(0.0, 0.05)}
+    ranges = {"period": (2000.0, 6000.0), "phase": (0.0, 1.0), "growth": (0.0, 0.05)}
+    """Period [s], phase, growth of the period per hour."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """2 frac(t / period) - 1."""
@@ -49,14 +46,8 @@ class SweptBeat(Additive):
     """A beat between two oscillators that drift apart: a line whose frequency sweeps."""
 
     name, known, stage, form = "swept_beat", False, "readout", "swept line in time"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """First period [s], how many times faster at 8 h, phase."""
-        return {
-            "period": rng.uniform(4000.0, 9000.0),
-            "growth": rng.uniform(4.0, 10.0),
-            "phase": rng.uniform(0.0, 2.0 * np.pi),
-        }
+    ranges = {"period": (4000.0, 9000.0), "growth": (4.0, 10.0), "phase": (0.0, 2.0 * np.pi)}
+    """First period [s], how many times faster at 8 h, phase."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """sin of a quadratic phase."""
@@ -110,10 +101,9 @@ class ReversalCount(Additive):
     """Fatigue: each reversal of temperature adds a step that heals slowly."""
 
     name, known, form = "reversal_count", False, "steps at reversals"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Healing time [s]."""
-        return {"healing": rng.uniform(4000.0, 20000.0)}
+    ranges = {"healing": (4000.0, 20000.0)}
+    """Healing time [s]."""
+    evenly = ("healing",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """A step of 1 at each reversal of more than 5 degC."""
@@ -168,10 +158,9 @@ class HotBursts(Additive):
     """Partial discharges: bursts of noise within a window of temperature."""
 
     name, known, stage, form = "bursts_when_hot", False, "noise", "noise in a window of temperature"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """From where [degC], correlation time of a burst [s]."""
-        return {"from": rng.uniform(30.0, 45.0), "correlation": rng.uniform(30.0, 200.0)}
+    ranges = {"from": (30.0, 45.0), "correlation": (30.0, 200.0)}
+    """From where [degC], correlation time of a burst [s]."""
+    evenly = ("correlation",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Correlated noise of unit variance while hot."""

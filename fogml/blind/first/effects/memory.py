@@ -36,11 +36,8 @@ class HysteresisPreisach(Additive):
     """Preisach's hysteresis with a density over half widths (Prandtl-Ishlinskii)."""
 
     name, form = "thermal_hysteresis", "Preisach"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Middle and spread of the half widths."""
-        middle = float(np.exp(rng.uniform(np.log(3.0), np.log(20.0))))
-        return {"half_width": middle, "spread": rng.uniform(0.2, 0.5)}
+    ranges = {"half_width": (3.0, 20.0), "spread": (0.2, 0.5)}
+    """Middle and spread of the half widths."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Minus the mean of the plays' departures."""
@@ -51,10 +48,9 @@ class ScaleFactorPreisach(ScaleFactor):
     """Preisach's hysteresis of the scale factor."""
 
     name, form = "sf_hysteresis", "Preisach"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Middle and spread of the half widths."""
-        return {"half_width": rng.uniform(3.0, 20.0), "spread": rng.uniform(0.2, 0.5)}
+    ranges = {"half_width": (3.0, 20.0), "spread": (0.2, 0.5)}
+    """Middle and spread of the half widths."""
+    evenly = ("half_width",)
 
     def error(self, world: World, shape: Shape) -> FloatArray:
         """Minus the mean of the plays' departures."""
@@ -115,11 +111,8 @@ class MoistureFick(Additive):
     """Fick's uptake of water by a slab: its first modes."""
 
     name, form, records = "moisture", "modes of Fick's law", ("humidity",)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Time constant of the slowest mode, static part."""
-        tau = float(np.exp(rng.uniform(np.log(36e3), np.log(400e3))))
-        return {"time_constant": tau, "static_ratio": rng.uniform(0.0, 0.1)}
+    ranges = {"time_constant": (36e3, 400e3), "static_ratio": (0.0, 0.1)}
+    """Time constant of the slowest mode, static part."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Uptake [%/h] and the static part."""
@@ -139,11 +132,8 @@ class AgeingPower(Additive):
     """Ageing by a power of time."""
 
     name, form = "ageing", "power law"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Time constant and exponent; exponent 0 is the logarithm."""
-        tau = float(np.exp(rng.uniform(np.log(3600.0), np.log(50e3))))
-        return {"time_constant": tau, "exponent": rng.uniform(-0.3, 0.3)}
+    ranges = {"time_constant": (3600.0, 50e3), "exponent": (-0.3, 0.3)}
+    """Time constant and exponent; exponent 0 is the logarithm."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """((1 + t / tau)**a - 1) / a."""

@@ -17,10 +17,8 @@ class LagOfTwoStages(Sensing):
 
     name, form, unit, fine_sensors = "sensor_lag", "two stages", "s", True
     greatest: ClassVar[float] = 900.0
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Share of the second stage."""
-        return {"second_share": rng.uniform(0.1, 0.5)}
+    ranges = {"second_share": (0.1, 0.5)}
+    evenly = ("second_share",)
 
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape

@@ -31,10 +31,9 @@ class ModulatorLoop(ScaleFactor):
 
     name, form, unit, records = "halfwave_voltage", "hyperbolic convergence", "ppm/degC", ("T_electronics",)
     demands = Demands(turns=True, power_steps=True, power_on=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """What the loop leaves, its time constant."""
-        return {"residual": rng.uniform(0.01, 0.03), "time_constant": rng.uniform(1.0, 60.0)}
+    ranges = {"residual": (0.01, 0.03), "time_constant": (1.0, 60.0)}
+    """What the loop leaves, its time constant."""
+    evenly = ("time_constant",)
 
     def error(self, world: World, shape: Shape) -> FloatArray:
         """u (1 + (1 / rho - 1) / (1 + t / tau)**3)."""
@@ -58,10 +57,9 @@ class Asymmetry(ScaleFactor):
     """Scale factors of the two directions, with an algebraic transition at zero."""
 
     name, form, unit = "sf_asymmetry", "algebraic transition", "ppm"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Width of the transition [deg/h]."""
-        return {"width": rng.uniform(0.3, 3.0)}
+    ranges = {"width": (0.3, 3.0)}
+    """Width of the transition [deg/h]."""
+    evenly = ("width",)
 
     def error(self, world: World, shape: Shape) -> FloatArray:
         """w / sqrt(w**2 + width**2)."""
@@ -153,10 +151,9 @@ class HuntingServo(Additive):
 
     name, known, stage, form = "hunting_servo", False, "rig", "oscillation while turning"
     demands = Demands(slow_turns=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Period [s] and phase."""
-        return {"period": rng.uniform(150.0, 900.0), "phase": rng.uniform(0.0, 2.0 * np.pi)}
+    ranges = {"period": (150.0, 900.0), "phase": (0.0, 2.0 * np.pi)}
+    """Period [s] and phase."""
+    evenly = ("period",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """sqrt(|rate| / 0.1 deg/s) sin(2 pi t / period)."""
