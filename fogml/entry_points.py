@@ -14,13 +14,7 @@ def origin(point: EntryPoint) -> str:
 
 
 def loaded(point: EntryPoint) -> Any:
-    """What an entry point declares.
-
-    Raises
-    ------
-    InputError
-        If it does not load.
-    """
+    """What an entry point declares."""
     try:
         return point.load()
     except Exception as error:  # others' code raises whatever it likes

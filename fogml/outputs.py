@@ -128,11 +128,6 @@ def sole_writer(path: str | Path) -> Iterator[None]:
     The system takes the lock back from a process that has ended, on whichever host of a shared file
     system. Where the file system has no locks, what the file states counts: a process of this host by
     whether it lives, one of another host as living.
-
-    Raises
-    ------
-    InputError
-        If another holds it, naming process and host.
     """
     real = Path(os.path.realpath(path))
     home = real if real.is_dir() and has_to_stay(real) else nearest_folder(real.parent)

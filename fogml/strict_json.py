@@ -40,13 +40,7 @@ def read_json(path: Path, remedy: str, most_bytes: int = MOST_BYTES) -> Any:
 
 
 def read_bytes(path: Path, remedy: str, most_bytes: int = MOST_BYTES) -> bytes:
-    """The bytes of a file of bounded size.
-
-    Raises
-    ------
-    InputError
-        If it can't be read or is too large.
-    """
+    """The bytes of a file of bounded size."""
     try:
         with path.open("rb") as file:
             data = file.read(most_bytes + 1)
@@ -99,13 +93,7 @@ def parse_json(text: str | bytes, source: str, remedy: str) -> Any:
 
 
 def json_object(value: Any, source: str, schema: str, remedy: str) -> dict[str, Any]:
-    """A value that was read, once it is known to be an object of a schema.
-
-    Raises
-    ------
-    InputError
-        If it is none, or states another schema.
-    """
+    """A value that was read, once it is known to be an object of a schema."""
     if not isinstance(value, dict) or value.get("schema") != schema:
         found = value.get("schema") if isinstance(value, dict) else type(value).__name__
         raise InputError(f"{source}: schema {quoted(found)}, expected '{schema}'; {remedy}")

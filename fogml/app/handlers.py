@@ -49,13 +49,7 @@ class _Handler(RequestHandler):
         self.clear_header("Server")
 
     def prepare(self) -> None:
-        """Refuse other names of this machine, other pages' requests, and who has no token.
-
-        Raises
-        ------
-        HTTPError
-            403.
-        """
+        """Refuse other names of this machine, other pages' requests, and who has no token."""
         request = self.request
         # Another name would be one that a stranger's page made point here.
         if request.host not in self.app.hosts:

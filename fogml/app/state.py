@@ -78,13 +78,7 @@ class Files:
             partial.unlink()
 
     def remove(self, name: str) -> None:
-        """Remove a file.
-
-        Raises
-        ------
-        InputError
-            If there is none of that name.
-        """
+        """Remove a file."""
         try:
             self.place(name).unlink()
         except FileNotFoundError:

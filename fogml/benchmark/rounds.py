@@ -132,11 +132,6 @@ def commitment(salt: str, files: tuple[Path, ...]) -> str:
     """SHA-256 over a salt and the files of an answer, in hexadecimal digits.
 
     Without the salt nobody can try likely answers until one has the hash that was published.
-
-    Raises
-    ------
-    InputError
-        If a file is missing.
     """
     found = hashlib.sha256(salt.encode("ascii"))
     for path in files:
@@ -148,13 +143,7 @@ def commitment(salt: str, files: tuple[Path, ...]) -> str:
 
 
 def read_round(directory: str | Path) -> dict[str, Any]:
-    """``handout/round.json`` of a round.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """``handout/round.json`` of a round."""
     path = Path(directory) / "handout" / "round.json"
     if not path.is_file():
         raise InputError(f"{path}: no such file; make a round first: fogml benchmark make {directory}")
@@ -165,13 +154,7 @@ def read_round(directory: str | Path) -> dict[str, Any]:
 
 
 def check_kept(directory: str | Path, told: dict[str, Any]) -> None:
-    """Hold what was kept against the hashes that were handed out.
-
-    Raises
-    ------
-    InputError
-        If the key or an answer is missing, or is another one than was bound.
-    """
+    """Hold what was kept against the hashes that were handed out."""
     path = Path(directory) / "kept" / "key.json"
     if not path.is_file():
         raise InputError(f"{path}: no such file; only who keeps a round's answers can score it")

@@ -120,13 +120,7 @@ def case_files(folder: Path, seed: int = 0) -> CaseFiles:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """The mapping in a JSON file.
-
-    Raises
-    ------
-    InputError
-        If it can't be read or holds no mapping.
-    """
+    """The mapping in a JSON file."""
     values = strict_json.read_json(path, "fogml blind makes, answers and scores cases")
     if not isinstance(values, dict):
         raise InputError(f"{path}: a JSON object was expected")

@@ -36,13 +36,7 @@ BASELINES = (*(name for name in METHODS if name != DIAGNOSIS), ORACLE)
 
 
 def load_method(text: str) -> Method:
-    """The method of a name of `METHODS`, or of ``package.module:function``.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """The method of a name of `METHODS`, or of ``package.module:function``."""
     module, colon, name = METHODS.get(text, text).partition(":")
     if not colon:
         if text == "families":

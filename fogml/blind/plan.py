@@ -35,13 +35,7 @@ def reality(name: str) -> Reality:
 
 
 def chosen(name: str) -> tuple[str, ...]:
-    """Names of the realities that a choice means.
-
-    Raises
-    ------
-    InputError
-        If there is no such choice.
-    """
+    """Names of the realities that a choice means."""
     if name == MIX:
         return REALITIES
     if name not in (*REALITIES, SAME_TWIN):
@@ -114,13 +108,7 @@ class Plan:
 
 
 def strata_from(least_d_prime: float) -> Strata:
-    """The strata whose lower bound reaches a d'.
-
-    Raises
-    ------
-    InputError
-        If none does.
-    """
+    """The strata whose lower bound reaches a d'."""
     found = tuple(bounds for bounds in STRATA if bounds[0] >= least_d_prime)
     if not found:
         raise InputError(f"least d' {least_d_prime:g}: no stratum begins there or above {STRATA[-1][0]:g}")
@@ -233,13 +221,7 @@ def is_final(seed: int) -> bool:
 
 
 def check_use(seed: int, final: Path | None) -> None:
-    """Refuse to score a final seed without the ledger, or another seed with it.
-
-    Raises
-    ------
-    InputError
-        Saying which flag is missing or too many.
-    """
+    """Refuse to score a final seed without the ledger, or another seed with it."""
     if is_final(seed) and final is None:
         raise InputError(
             f"seed {seed} is kept for final figures (from {FINAL_FROM} on): score it with --final, which "

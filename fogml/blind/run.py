@@ -163,13 +163,7 @@ def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int
 
 
 def check_out_of_reach(plan: RunPlan) -> None:
-    """Refuse a suite whose truth lies among what a sealed process may read.
-
-    Raises
-    ------
-    InputError
-        Naming the folder.
-    """
+    """Refuse a suite whose truth lies among what a sealed process may read."""
     roots = (*own_roots(), *([plan.code.resolve()] if plan.code else []))
     if within(plan.folder.truth, roots):
         raise InputError(

@@ -269,13 +269,7 @@ def read_truth(path: Path) -> Truth:
 
 
 def read_contributions(path: Path) -> dict[tuple[str, int], FloatArray]:
-    """What `write_truth` was given as `contributions`, from the ``.npz`` file.
-
-    Raises
-    ------
-    InputError
-        If it is damaged, or holds other arrays.
-    """
+    """What `write_truth` was given as `contributions`, from the ``.npz`` file."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
             return {_parsed(key): arrays[key] for key in arrays.files}

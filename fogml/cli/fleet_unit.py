@@ -185,13 +185,7 @@ class UnitWork:
 
 
 def check_belong(unit: Unit, runs: Sequence[Run]) -> None:
-    """Check that runs are of the unit and axis that the manifest names.
-
-    Raises
-    ------
-    InputError
-        Naming the run.
-    """
+    """Check that runs are of the unit and axis that the manifest names."""
     for run in runs:
         for what, stated, wanted in (
             ("unit", run.facts.unit, unit.name),

@@ -13,13 +13,7 @@ from fogml.yaml_text import parse_yaml
 
 
 def named_values(texts: list[Any]) -> dict[str, Any]:
-    """``["name=value", ...]`` as flags give them, each value read as YAML reads it.
-
-    Raises
-    ------
-    ValueError
-        If one is not of that form.
-    """
+    """``["name=value", ...]`` as flags give them, each value read as YAML reads it."""
     values = {}
     for text in texts:
         name, equals, value = str(text).partition("=")
@@ -30,13 +24,7 @@ def named_values(texts: list[Any]) -> dict[str, Any]:
 
 
 def numbers_by_name(texts: list[Any], expected: str) -> dict[str, float]:
-    """``["name=value", ...]`` as flags give them, each value a number.
-
-    Raises
-    ------
-    ValueError
-        If one is not of that form, with what was expected.
-    """
+    """``["name=value", ...]`` as flags give them, each value a number."""
     values = {}
     for text in texts:
         name, equals, number = str(text).partition("=")
@@ -50,13 +38,7 @@ def numbers_by_name(texts: list[Any], expected: str) -> dict[str, float]:
 
 
 def number_list(text: str, example: str) -> list[float]:
-    """Numbers of a text with commas.
-
-    Raises
-    ------
-    ValueError
-        With an example, if one is no number.
-    """
+    """Numbers of a text with commas."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:

@@ -56,13 +56,7 @@ def most_dropped(repair: Repairing) -> float:
 
 
 def check_named_once(paths: Sequence[str]) -> None:
-    """Hold that no run is named twice.
-
-    Raises
-    ------
-    InputError
-        Naming those that are.
-    """
+    """Hold that no run is named twice."""
     twice = sorted({path for path in paths if list(paths).count(path) > 1})
     if twice:
         raise InputError(f"{', '.join(twice)}: named more than once; give each run once")

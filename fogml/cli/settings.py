@@ -56,13 +56,7 @@ class Settings(Strict):
 
     @classmethod
     def gather(cls, config: Path | None, flags: Mapping[str, Any]) -> Self:
-        """The settings from a YAML file and from flags; a flag that is None or empty is not set.
-
-        Raises
-        ------
-        InputError
-            If the file can't be read, a key is unknown or a value does not fit.
-        """
+        """The settings from a YAML file and from flags; a flag that is None or empty is not set."""
         stated = read_config(config) if config is not None else {}
         # A path in a configuration file may be meant from where the file lies.
         for key in set(stated) & set(cls.path_keys):
@@ -142,13 +136,7 @@ def config_file(command: str) -> str:
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """The mapping in a YAML file.
-
-    Raises
-    ------
-    InputError
-        If the file can't be read or holds no mapping.
-    """
+    """The mapping in a YAML file."""
     values = read_yaml(path)
     if values is None:
         return {}

@@ -49,13 +49,7 @@ def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:
 
 
 def check_settings(settings: TrainSettings | CompareSettings) -> None:
-    """Check what can be checked before a run is read.
-
-    Raises
-    ------
-    InputError
-        Naming the setting.
-    """
+    """Check what can be checked before a run is read."""
     check_limits(settings.limits)
     check_design_index(settings.design_index)
     check_turn_on_band(settings.turn_on_band)

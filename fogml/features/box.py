@@ -47,13 +47,7 @@ class Box:
 
     @classmethod
     def around(cls, parts: Iterable[tuple[FloatArray, BoolArray]]) -> Box:
-        """The box around atom values (n, a), of the rows marked full (n,).
-
-        Raises
-        ------
-        InputError
-            If no row is full.
-        """
+        """The box around atom values (n, a), of the rows marked full (n,)."""
         lows, highs = [], []
         for values, full in parts:
             if full.all() and len(values):

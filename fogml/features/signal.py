@@ -167,13 +167,7 @@ def held_by(run: Run, name: str) -> bool:
 
 
 def input_of(run: Run, name: str) -> FloatArray:
-    """What a name in formulas stands for in a run, shape (n,).
-
-    Raises
-    ------
-    InputError
-        If the run does not hold it.
-    """
+    """What a name in formulas stands for in a run, shape (n,)."""
     if is_temperature(name):
         return run.temperature(name)
     if name in run.columns and name not in NOT_INPUTS:
@@ -190,13 +184,7 @@ def input_of(run: Run, name: str) -> FloatArray:
 
 
 def check_holds(run: Run, names: Iterable[str], text: str) -> None:
-    """Refuse a run that lacks one of the names in a feature text.
-
-    Raises
-    ------
-    InputError
-        Pointing at the first such name's place in the text.
-    """
+    """Refuse a run that lacks one of the names in a feature text."""
     lacking = next((name for name in names if not held_by(run, name)), None)
     if lacking is None:
         return

@@ -96,13 +96,7 @@ def composition_plan(terms: Sequence[Term], atoms: Sequence[Atom]) -> tuple[Step
 
 
 def atom_matrix(values: ArrayLike, atoms: int) -> FloatArray:
-    """Values of so many atoms as float64.
-
-    Raises
-    ------
-    InputError
-        If the shape is not (n, atoms).
-    """
+    """Values of so many atoms as float64."""
     matrix = np.asarray(values, dtype=np.float64)
     if matrix.ndim != 2 or matrix.shape[1] != atoms:
         raise InputError(f"features: atom values of shape {matrix.shape}, (n, {atoms}) was expected")

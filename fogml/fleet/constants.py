@@ -142,13 +142,7 @@ class UnitConstants:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> UnitConstants:
-        """The constants that `as_dict` wrote.
-
-        Raises
-        ------
-        InputError
-            If they are others.
-        """
+        """The constants that `as_dict` wrote."""
         try:
             names = ("triangles", "shift", "scale")
             arrays = {name: np.asarray(values[name], dtype=np.float64) for name in names}

@@ -115,13 +115,7 @@ class CovariateEffects:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> CovariateEffects:
-        """The effects that `as_dict` wrote.
-
-        Raises
-        ------
-        InputError
-            If they are others.
-        """
+        """The effects that `as_dict` wrote."""
         saved = strictly(_Saved, values, "covariates")
         within = Prior.from_dict(saved.within)
         count, width = len(saved.names), len(within.mean)

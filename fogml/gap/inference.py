@@ -26,13 +26,7 @@ from fogml.twin.twin import Twin
 
 
 def check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -> None:
-    """Refuse runs that can't be diagnosed together.
-
-    Raises
-    ------
-    InputError
-        If there is no fit run, a run is used twice, or runs are of different units or axes.
-    """
+    """Refuse runs that can't be diagnosed together."""
     if not fit:
         raise InputError("no run to diagnose is given")
     held: dict[str, tuple[str, str]] = {}

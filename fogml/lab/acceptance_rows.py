@@ -237,11 +237,6 @@ def read_limits(path: str | Path) -> Limits:
 
     A number bounds the size of a figure; ``{from: ..., to: ...}`` its value, either end of which may be
     left out. Beside ``limits`` there may be ``customer`` and ``document``.
-
-    Raises
-    ------
-    InputError
-        Naming the key that is not known, or the value that is no limit.
     """
     path = Path(path)
     values = read_yaml(path, ("customer", "document"))

@@ -183,13 +183,7 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
 
 
 def check_states(measured: TableMeasurements) -> None:
-    """Hold that all four states are there.
-
-    Raises
-    ------
-    InputError
-        Naming those that are missing.
-    """
+    """Hold that all four states are there."""
     missing = [str(state) for state in STATES if not np.any(measured.state == state)]
     if missing:
         raise InputError(

@@ -36,11 +36,6 @@ def compare_methods(measured: TableMeasurements, cross_tilt: bool | None = None)
     at 90 deg for the misalignment (sin d taken as d), where the states are quarter turns; it sees the
     fixture's zero error as misalignment. One state alone gives R = K sqrt(1 - a_y^2) for K and, with the
     fixture's zero error in it, one angle.
-
-    Raises
-    ------
-    InputError
-        As `decouple`.
     """
     four = decouple(measured, cross_tilt)
     alone = fit_state(measured, 1, four.cross_tilt)

@@ -93,13 +93,7 @@ def error_matrices(latitude_deg: float, axis: str) -> tuple[FloatArray, FloatArr
 def constant_drift(
     drift_deg_h: float, hours: FloatArray | Sequence[float], latitude_deg: float, axis: str = "east"
 ) -> NavigationError:
-    """Errors after given times under a constant drift [deg/h], in closed form (a matrix exponential each).
-
-    Raises
-    ------
-    InputError
-        As `error_matrices`.
-    """
+    """Errors after given times under a constant drift [deg/h], in closed form (a matrix exponential each)."""
     times = 3600.0 * np.atleast_1d(np.asarray(hours, dtype=np.float64))
     f, b = error_matrices(latitude_deg, axis)
     scale = _scale()

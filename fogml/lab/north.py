@@ -247,13 +247,7 @@ def horizontal_rate(latitude_deg: float) -> float:
 
 
 def check_sense(sense: str) -> None:
-    """Hold that a sense is ``cw`` or ``ccw``.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
+    """Hold that a sense is ``cw`` or ``ccw``."""
     if sense not in SENSES:
         raise InputError(f"sense '{sense}': cw (clockwise seen from above) or ccw was expected")
 
@@ -271,13 +265,7 @@ def design_matrix(
 
 
 def check_design(design: FloatArray, observes_drift: bool) -> None:
-    """Hold that positions tell an azimuth, and a linear drift if asked.
-
-    Raises
-    ------
-    InputError
-        If they don't.
-    """
+    """Hold that positions tell an azimuth, and a linear drift if asked."""
     scaled = design / np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     if np.linalg.matrix_rank(scaled[:, :3], tol=1e-6) < 3:
         raise InputError("the positions do not tell an azimuth: at least three different angles are needed")

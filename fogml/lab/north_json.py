@@ -40,13 +40,7 @@ def recorded_north_json(
     settle_s: float = 0.0,
     latitude_deg: float | None = None,
 ) -> dict[str, Any]:
-    """North from a recorded run, schema ``fogml.north/1``; see :func:`north_from_positions`.
-
-    Raises
-    ------
-    InputError
-        As `north_from_positions`.
-    """
+    """North from a recorded run, schema ``fogml.north/1``; see :func:`north_from_positions`."""
     fix = north_from_positions(
         run, sense=sense, order_deg=order_deg, method=method, settle_s=settle_s, latitude_deg=latitude_deg
     )

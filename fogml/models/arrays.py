@@ -49,13 +49,7 @@ def arrays_from_bytes(data: bytes) -> dict[str, NDArray[Any]]:
 def expect_arrays(
     arrays: Mapping[str, NDArray[Any]], expected: Mapping[str, tuple[DTypeLike, tuple[int, ...]]]
 ) -> None:
-    """Hold that arrays are exactly those expected, by name, type and shape.
-
-    Raises
-    ------
-    InputError
-        Naming the array that is not.
-    """
+    """Hold that arrays are exactly those expected, by name, type and shape."""
     for name in {**expected, **arrays}:
         if name not in expected:
             raise InputError(f"array '{name}' does not belong to this model")

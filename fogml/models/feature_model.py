@@ -275,13 +275,7 @@ class FeatureModel(DriftModel):
 
 
 def check_feature_text(text: str) -> None:
-    """Hold that text of features is understood, ``{sensor}`` standing for any sensor.
-
-    Raises
-    ------
-    InputError
-        Pointing at what is not.
-    """
+    """Hold that text of features is understood, ``{sensor}`` standing for any sensor."""
     parse_features(text.replace(_EACH_SENSOR, "T1"))
 
 

@@ -70,13 +70,7 @@ class Prior:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Prior:
-        """The prior that `as_dict` wrote.
-
-        Raises
-        ------
-        InputError
-            If the numbers do not make a prior.
-        """
+        """The prior that `as_dict` wrote."""
         try:
             saved = strictly(_SavedPrior, values, "prior")
             units = float("inf") if saved.units is None else saved.units

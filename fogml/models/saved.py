@@ -188,13 +188,7 @@ def model_to_saved(model: DriftModel) -> tuple[dict[str, Any], dict[str, NDArray
 
 
 def model_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> DriftModel:
-    """The model that `model_to_saved` gave.
-
-    Raises
-    ------
-    InputError
-        If the values are not those of a saved model.
-    """
+    """The model that `model_to_saved` gave."""
     model_class = model_of_form(values["form"], values["kind"])
     card = strictly(TrainingCard, values["card"], "card")
     intervals = saved_intervals(values["interval"])

@@ -175,13 +175,7 @@ def averaged_table(rows: Sequence[RunRows], compose: Compose, averaging_s: float
 
 
 def row_count(rows: Sequence[RunRows]) -> int:
-    """Number of training rows.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Number of training rows."""
     count = sum(len(part.y) for part in rows)
     if count == 0:
         raise InputError(

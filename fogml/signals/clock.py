@@ -139,13 +139,7 @@ def told_share(share: Number, least: float) -> Number:
 
 
 def check_window(window_s: float, sample_s: float, intervals: int, what: str) -> None:
-    """Refuse a window that is no positive number, or shorter than so many sample intervals.
-
-    Raises
-    ------
-    InputError
-        Naming `what`, and the length to widen it to.
-    """
+    """Refuse a window that is no positive number, or shorter than so many sample intervals."""
     if not window_s > 0.0 or not np.isfinite(window_s):
         raise InputError(f"{what} of {window_s:g} s: a positive number of seconds was expected")
     if window_s < intervals * sample_s * (1.0 - EDGE_TOLERANCE):

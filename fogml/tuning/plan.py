@@ -65,13 +65,7 @@ class Plan:
     heartbeat_s: float = 10.0
 
     def check(self) -> None:
-        """Check what can be checked before a run is read.
-
-        Raises
-        ------
-        InputError
-            Naming the setting.
-        """
+        """Check what can be checked before a run is read."""
         from fogml.tuning.held_out import FOLD_COUNTS
 
         if self.trials < 1:

@@ -143,13 +143,7 @@ class Space(Strict):
                     yield text.replace(BUILDER, builder)
 
     def check(self) -> None:
-        """Check models, their parameters and features before any run is read.
-
-        Raises
-        ------
-        InputError
-            Naming what is not understood.
-        """
+        """Check models, their parameters and features before any run is read."""
         from fogml.features.parse import parse_features
         from fogml.models.names import make_model
 

@@ -129,13 +129,7 @@ class _Drawn(BaseModel):
 
 
 def check_trials(study: optuna.Study, plan: Plan) -> None:
-    """Check every trial that is there.
-
-    Raises
-    ------
-    InputError
-        Naming the first trial that is not as a sweep writes it.
-    """
+    """Check every trial that is there."""
     for trial in study.get_trials(deepcopy=False):
         fault = _fault(trial, len(plan.objectives))
         if fault:

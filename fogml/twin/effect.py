@@ -119,11 +119,6 @@ class Effect(ABC):
         """Amplitude and shape from a mapping such as a twin file's.
 
         Shape parameters that are not stated take their tactical middle.
-
-        Raises
-        ------
-        InputError
-            Naming the unknown key, or the value outside its physical limits.
         """
         owner = f"effect '{self.id}'"
         known = {"amplitude": self.amplitude, **{p.name: p for p in self.shape}}

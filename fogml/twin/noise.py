@@ -76,24 +76,12 @@ NAMES = tuple(field.name for field in fields(NoiseConstants))
 
 
 def stream(seed: int, name: str) -> np.random.Generator:
-    """A generator of its own for a named source, so that adding a source leaves the others alone.
-
-    Raises
-    ------
-    InputError
-        If the seed is negative.
-    """
+    """A generator of its own for a named source, so that adding a source leaves the others alone."""
     return generator(seed, zlib.crc32(name.encode()))
 
 
 def generator(seed: int, number: int) -> np.random.Generator:
-    """The generator of this number out of a seed's.
-
-    Raises
-    ------
-    InputError
-        If the seed is negative.
-    """
+    """The generator of this number out of a seed's."""
     return np.random.default_rng([_checked(seed), number])
 
 

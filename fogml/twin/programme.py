@@ -148,13 +148,7 @@ def load_programme(source: str | Path | Mapping[str, Any] | Sequence[Any]) -> Pr
 
 
 def programme_from(values: Any, source: str = "programme") -> Programme:
-    """A programme from the values of a YAML file, or from a list of steps.
-
-    Raises
-    ------
-    InputError
-        Naming source, key or step, and pointing at what was not understood.
-    """
+    """A programme from the values of a YAML file, or from a list of steps."""
     if isinstance(values, list | tuple):
         values = {"schema": SCHEMA, "steps": list(values)}
     if not isinstance(values, Mapping):

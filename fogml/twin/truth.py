@@ -83,13 +83,7 @@ class Truth:
         return columns | {f"{_PART}{id} [deg/h]": values for id, values in self.contributions.items()}
 
     def check_fits(self, time: FloatArray, name: str) -> None:
-        """Check that this is the truth of a recording with these times.
-
-        Raises
-        ------
-        InputError
-            If it is not.
-        """
+        """Check that this is the truth of a recording with these times."""
         if len(time) != len(self.time) or not np.allclose(time, self.time, rtol=0.0, atol=1e-6):
             raise InputError(
                 f"{name}: its {len(time)} times are not those of the truth, which has {len(self.time)}; "
@@ -98,13 +92,7 @@ class Truth:
 
 
 def truth_from_columns(columns: Mapping[str, FloatArray], source: str = "truth") -> Truth:
-    """The truth from the columns of its file.
-
-    Raises
-    ------
-    InputError
-        If a column is missing.
-    """
+    """The truth from the columns of its file."""
     named = {parse_header(cell)[0]: np.asarray(values) for cell, values in columns.items()}
     for name in ("time", "rate", "time_on", "noise_free", "noise"):
         if name not in named:
@@ -125,13 +113,7 @@ def truth_from_columns(columns: Mapping[str, FloatArray], source: str = "truth")
 
 
 def read_truth(path: str | Path) -> Truth:
-    """The truth in a Parquet or CSV file.
-
-    Raises
-    ------
-    InputError
-        If it can't be read or is none.
-    """
+    """The truth in a Parquet or CSV file."""
     path = Path(path)
     if path.suffix.lower() == ".parquet":
         return truth_from_columns(next(parquet_blocks(path, None)).columns, path.name)

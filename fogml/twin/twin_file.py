@@ -83,13 +83,7 @@ def save_twin(twin: Twin, path: str | Path) -> None:
 
 
 def twin_from(values: Any, source: str = "twin") -> Twin:
-    """A twin from the values of a twin file.
-
-    Raises
-    ------
-    InputError
-        Naming source and key.
-    """
+    """A twin from the values of a twin file."""
     if not isinstance(values, Mapping):
         raise InputError(f"{source}: a twin file holds 'key: value' lines; see configs/twin/nominal.yaml")
     try:

@@ -68,13 +68,7 @@ def floors_over(run: Run, averaging_s: float, times_s: Sequence[float]) -> list[
 
 
 def check_noise_run(noise: Run) -> None:
-    """Refuse a run that can't tell a unit's noise.
-
-    Raises
-    ------
-    InputError
-        If the table turns in it.
-    """
+    """Refuse a run that can't tell a unit's noise."""
     if not np.all(rows_at_rest(noise)):
         raise InputError(f"{noise.name}: the table turns in it; a noise run is a static one")
 

@@ -93,13 +93,7 @@ def common_rows(errors: Sequence[RunErrors]) -> BoolArray:
 
 
 def training_means(errors: Sequence[RunErrors]) -> tuple[float, float]:
-    """Mean error before and after over the rows that count of all training runs [deg/h].
-
-    Raises
-    ------
-    InputError
-        If no row counts.
-    """
+    """Mean error before and after over the rows that count of all training runs [deg/h]."""
     rows = sum(int(e.used.sum()) for e in errors)
     if rows == 0:
         names = ", ".join(e.run.name for e in errors)
