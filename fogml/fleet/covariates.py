@@ -9,20 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from pydantic import with_config
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.models.prior import Prior
-from fogml.strict import Strict, strictly
+from fogml.strict import CONTENT, Matrix, Vector, as_written, strictly
 
 Covariates = Mapping[str, str]
 """Values by name, as a manifest states them: numbers or labels; what is not known is left out."""
 
 
+@with_config(CONTENT)
 @dataclass(frozen=True)
 class CovariateColumns:
     """Covariates as c columns: a number in its spread, a label as a column of its own that is 0 or 1.
@@ -36,8 +38,8 @@ class CovariateColumns:
     """
 
     names: tuple[str, ...]
-    centre: FloatArray
-    scale: FloatArray
+    centre: Vector
+    scale: Vector
 
     @classmethod
     def of(cls, units: Sequence[Covariates]) -> CovariateColumns:
@@ -70,6 +72,7 @@ class CovariateColumns:
         return values, known
 
 
+@with_config(CONTENT)
 @dataclass(frozen=True)
 class CovariateEffects:
     """How a fleet's k + 1 constants go with c covariates.
@@ -89,9 +92,9 @@ class CovariateEffects:
     """
 
     columns: CovariateColumns
-    slopes: FloatArray
-    spread: FloatArray
-    inverse: FloatArray
+    slopes: Matrix
+    spread: Matrix
+    inverse: Matrix
     within: Prior
 
     def prior(self, unit: Covariates) -> Prior:
@@ -105,48 +108,23 @@ class CovariateEffects:
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
-        c = self.columns
-        arrays = {"centre": c.centre, "scale": c.scale, "slopes": self.slopes, "spread": self.spread}
-        return {
-            "names": list(c.names),
-            **{name: values.tolist() for name, values in {**arrays, "inverse": self.inverse}.items()},
-            "within": self.within.as_dict(),
-        }
+        values = as_written(self)
+        return {**values.pop("columns"), **values, "within": self.within.as_dict()}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> CovariateEffects:
         """The effects that `as_dict` wrote."""
-        saved = strictly(_Saved, values, "covariates")
-        within = Prior.from_dict(saved.within)
-        count, width = len(saved.names), len(within.mean)
-        wanted = {
-            "centre": (count,),
-            "scale": (count,),
-            "slopes": (count, width),
-            "spread": (count, count),
-            "inverse": (count + 1, count + 1),
-        }
-        try:
-            arrays = {
-                name: np.array(getattr(saved, name), dtype=np.float64).reshape(shape)
-                for name, shape in wanted.items()
-            }
-        except ValueError:
-            raise InputError(
-                "the fleet's covariates are not understood: sizes don't belong together"
-            ) from None
-        columns = CovariateColumns(tuple(saved.names), arrays["centre"], arrays["scale"])
-        return cls(columns, arrays["slopes"], arrays["spread"], arrays["inverse"], within)
-
-
-class _Saved(Strict):
-    names: list[str]
-    centre: list[float]
-    scale: list[float]
-    slopes: list[list[float]]
-    spread: list[list[float]]
-    inverse: list[list[float]]
-    within: dict[str, Any]
+        names = [field.name for field in fields(CovariateColumns)]
+        columns = {name: value for name, value in values.items() if name in names}
+        others = {name: value for name, value in values.items() if name not in names}
+        saved = strictly(cls, {"columns": columns, **others}, "covariates")
+        count, width = len(saved.columns.names), len(saved.within.checked().mean)
+        held = (saved.columns.centre, saved.columns.scale, saved.slopes, saved.spread, saved.inverse)
+        wanted = ((count,), (count,), (count, width), (count, count), (count + 1, count + 1))
+        if any(a.size != math.prod(shape) for a, shape in zip(held, wanted)):
+            raise InputError("the fleet's covariates are not understood: sizes don't belong together")
+        square = {"slopes": saved.slopes.reshape(count, width), "spread": saved.spread.reshape(count, count)}
+        return replace(saved, **square)
 
 
 def _number(text: str) -> float | None:

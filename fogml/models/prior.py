@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field, PlainSerializer, with_config
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals.distributions import chi2_sf
-from fogml.strict import Strict, strictly
+from fogml.strict import CONTENT, Matrix, Vector, as_written, strictly
 
 _SPREADS = np.logspace(0.0, 8.0, 33)
 # Factors by which a unit's prior covariance may be wider than its fleet's.
@@ -23,7 +23,14 @@ _DRAWS = 10_000
 _TOLD = 0.1
 # Least that rows tell of a direction, against what the fleet tells, for the direction to be checked.
 
+_OR_NONE = (
+    BeforeValidator(lambda units: float("inf") if units is None else units),
+    PlainSerializer(lambda units: units if np.isfinite(units) else None),
+)
+"""In a file infinitely many units are null."""
 
+
+@with_config(CONTENT)
 @dataclass(frozen=True)
 class Prior:
     """Normal distribution of a fleet's coefficients in the columns ``[1, (x - shift) / scale]``.
@@ -41,12 +48,12 @@ class Prior:
         ones seen through noise, tell that badly; shape (k + 1,), none where they are known.
     """
 
-    mean: FloatArray
-    covariance: FloatArray
-    shift: FloatArray
-    scale: FloatArray
-    units: float = float("inf")
-    wider: FloatArray | None = None
+    mean: Annotated[Vector, Field(min_length=1)]
+    covariance: Matrix
+    shift: Vector
+    scale: Vector
+    units: Annotated[float, Field(ge=1.0, allow_inf_nan=True), *_OR_NONE] = float("inf")
+    wider: Vector | None = None
 
     @property
     def of_a_next(self) -> FloatArray:
@@ -65,41 +72,37 @@ class Prior:
 
     def as_dict(self) -> dict[str, Any]:
         """The prior as JSON-ready values."""
-        values = {key: np.asarray(value).tolist() for key, value in vars(self).items() if value is not None}
-        return {**values, "units": self.units if np.isfinite(self.units) else None}
+        return {key: value for key, value in as_written(self).items() if key != "wider" or value is not None}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Prior:
-        """The prior that `as_dict` wrote."""
+        """The prior that `as_dict` wrote.
+
+        Raises
+        ------
+        InputError
+            If the numbers do not make a prior.
+        """
         try:
-            saved = strictly(_SavedPrior, values, "prior")
-            units = float("inf") if saved.units is None else saved.units
-            names = ("mean", "covariance", "shift", "scale")
-            arrays = {name: np.array(getattr(saved, name), dtype=np.float64) for name in names}
-            width = len(saved.mean)
-            shapes = [arrays[name].shape for name in ("covariance", "shift", "scale")]
-            if shapes != [(width, width), (width - 1,), (width - 1,)]:
-                raise ValueError("shapes do not match")
-            if not np.all(arrays["scale"]):
-                raise ValueError("a scale is 0")
-            np.linalg.cholesky(arrays["covariance"])
-            wider = None if saved.wider is None else np.array(saved.wider, dtype=np.float64)
-            if wider is not None and (wider.shape != (width,) or not np.all(wider > 0.0)):
-                raise ValueError(f"{width} positive factors 'wider' were expected")
-        except (ValueError, InputError, np.linalg.LinAlgError) as error:
+            return strictly(cls, values, "prior").checked()
+        except InputError as error:
             raise InputError(f"the fleet's prior is not understood ({error})") from None
-        return cls(**arrays, units=units, wider=wider)
 
-
-class _SavedPrior(Strict):
-    """A prior as `Prior.as_dict` writes it."""
-
-    mean: list[float] = Field(min_length=1)
-    covariance: list[list[float]]
-    shift: list[float]
-    scale: list[float]
-    units: float | None = Field(default=None, ge=1.0)
-    wider: list[float] | None = None
+    def checked(self) -> Prior:
+        """The prior, once its numbers make one."""
+        width = len(self.mean)
+        shapes = [self.covariance.shape, self.shift.shape, self.scale.shape]
+        if shapes != [(width, width), (width - 1,), (width - 1,)]:
+            raise InputError("shapes do not match")
+        if not np.all(self.scale):
+            raise InputError("a scale is 0")
+        try:
+            np.linalg.cholesky(self.covariance)
+        except np.linalg.LinAlgError as error:
+            raise InputError(str(error)) from None
+        if self.wider is not None and (self.wider.shape != (width,) or not np.all(self.wider > 0.0)):
+            raise InputError(f"{width} positive factors 'wider' were expected")
+        return self
 
 
 def posterior(
