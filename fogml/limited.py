@@ -53,15 +53,6 @@ class Finished:
 def run_limited(words: Sequence[str], limits: ProgramLimits, data: bytes = b"") -> Finished:
     """Run a program; its words go to it as they are, and no shell reads them.
 
-    Parameters
-    ----------
-    words
-        The program and its arguments.
-    limits
-        What it may take.
-    data
-        Its standard input.
-
     Raises
     ------
     LimitExceededError

@@ -58,15 +58,6 @@ def parse_json(text: str | bytes, source: str, remedy: str) -> Any:
 
     Whole numbers fit 64 bits, so that each of them is a float too.
 
-    Parameters
-    ----------
-    text
-        The text; bytes are UTF-8.
-    source
-        What it is, for messages.
-    remedy
-        What to do about a fault, for messages.
-
     Raises
     ------
     InputError

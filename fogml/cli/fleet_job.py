@@ -25,13 +25,6 @@ from fogml.tracking import Tracker
 def batch_of(units: Sequence[Mapping[str, Any]], home: Path) -> dict[str, Any] | None:
     """The batch of the units whose acceptance report is there, schema ``fogml.batch/1``; None without one.
 
-    Parameters
-    ----------
-    units
-        Of a ``fleet.json``.
-    home
-        The fleet's folder.
-
     Raises
     ------
     InputError

@@ -24,13 +24,6 @@ def report_unexpected(error: BaseException, arguments: Sequence[str]) -> str:
 
     The report holds the traceback, the version, the command line and the platform; no data. It is
     written beside the command's output, else among temporary files.
-
-    Parameters
-    ----------
-    error
-        What nobody expected.
-    arguments
-        The command line without the program's name.
     """
     text = printable(str(error).strip().split("\n")[0])
     line = f"fogml: unexpected error ({type(error).__name__}{': ' if text else ''}{text})"

@@ -14,13 +14,6 @@ from fogml.runs.run import Run
 def check_suits(features: Features, runs: Sequence[Run]) -> None:
     """Refuse features that training runs can tell nothing of.
 
-    Parameters
-    ----------
-    features
-        The features, of columns that the runs hold.
-    runs
-        Training runs.
-
     Raises
     ------
     InputError

@@ -26,15 +26,7 @@ _TREND_LEVEL = 0.01
 
 
 def fleet_json(outcomes: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What the units tell together.
-
-    Parameters
-    ----------
-    outcomes
-        As `fogml.fleet.engines.run_tasks` gives them.
-    settings
-        What the jobs were done with, JSON-ready.
-    """
+    """What the units tell together."""
     units = [_unit(outcome) for outcome in outcomes]
     judged = [unit for unit in units if unit["after"] is not None]
     constants = _constants(outcomes)

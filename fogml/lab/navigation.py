@@ -189,13 +189,6 @@ def navigation_costs(judgement: Judgement, latitude_deg: float) -> dict[str, Any
     The recorded drift, averaged as the judgement is, goes through the error dynamics as far as the run
     goes; beside it stands a constant drift of the run's rms over 24 h. One gyro drifts at a time.
 
-    Parameters
-    ----------
-    judgement
-        A judged model.
-    latitude_deg
-        Where the system stands.
-
     Returns
     -------
     dict

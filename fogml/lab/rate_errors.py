@@ -97,15 +97,6 @@ def nonlinearity_within(run: Run, plateaus: Plateaus, scale_factor: float) -> tu
     each rate, white, flicker and random walk, weighed by what they speak for. An error of the table's
     that comes with a rate each time is in the interval as the gyro's own would be.
 
-    Parameters
-    ----------
-    run
-        That the plateaus are of.
-    plateaus
-        At rates that the output follows.
-    scale_factor
-        Of the line.
-
     Returns
     -------
     tuple of float or None

@@ -66,13 +66,7 @@ TURNS = 0.2
 
 
 def ways_moved(temperatures: Sequence[FloatArray]) -> frozenset[str]:
-    """Which ways, ``up`` and ``down``, temperature moves by a fifth of its span, in all runs together.
-
-    Parameters
-    ----------
-    temperatures
-        T [degC] of each run, shapes (n,).
-    """
+    """Which ways, ``up`` and ``down``, temperature moves by a fifth of its span, in all runs together."""
     moved = {"up": 0.0, "down": 0.0}
     low, high = np.inf, -np.inf
     for T in temperatures:
@@ -96,11 +90,6 @@ def direction_is_told(temperatures: Sequence[FloatArray]) -> bool:
     It is by a run that moves both ways, or by runs of one way each of which both ways are left whichever run
     is left out. Of a run up and a run down, a shift from run to run looks like direction, and no run left out
     can tell: what is left moves one way only.
-
-    Parameters
-    ----------
-    temperatures
-        T [degC] of each run, shapes (n,).
     """
     if any(moves_both_ways([T]) for T in temperatures):
         return True

@@ -111,15 +111,7 @@ def standard_errors(columns: FloatArray, covariance: FloatArray, noise: float) -
 
 
 def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[str, Fold]]:
-    """Parts to leave out: whole runs, halves of each run, either direction of temperature, blocks of time.
-
-    Parameters
-    ----------
-    table
-        Averages, run after run.
-    temperature
-        Their temperature [degC], shape (n,).
-    """
+    """Parts to leave out: whole runs, halves of each run, either direction of temperature, blocks of time."""
     runs = [np.flatnonzero(table.run_index == run) for run in np.unique(table.run_index)]
     rising = np.zeros(len(table), dtype=np.bool_)
     for rows in runs:
@@ -143,19 +135,7 @@ def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[
 def left_out(
     members: Sequence[Member], union: Features, table: TrainingTable, parts: Sequence[tuple[str, Fold]]
 ) -> list[LeftOut]:
-    """What members predict of each part, fitted to the rest and limited to its box.
-
-    Parameters
-    ----------
-    members
-        The members.
-    union
-        Features that hold all atoms of the members.
-    table
-        Averages of the union's atoms.
-    parts
-        As `left_out_parts` gives.
-    """
+    """What members predict of each part, fitted to the rest and limited to its box."""
     found = []
     for kind, (fitted, held) in parts:
         rest, part = table.take(fitted), table.take(held)

@@ -92,13 +92,6 @@ def operations_of_features(atoms: Sequence[Atom], steps: Sequence[Step], sample_
     """Additions, multiplications and divisions from a sample to feature columns, windows full.
 
     Operators of one's own count for what they state.
-
-    Parameters
-    ----------
-    atoms, steps
-        What features are made of, and how.
-    sample_s
-        Sample interval [s].
     """
     count = 0
     windows = {(atom.signal, atom.window, atom.operator == "diff") for atom in atoms if atom.window}

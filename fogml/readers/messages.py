@@ -33,17 +33,7 @@ _time_of = itemgetter(0)
 def messages(
     file: BinaryIO, chunks: Sequence[Any], channels: Collection[int]
 ) -> Iterator[tuple[int, int, bytes]]:
-    """Time of recording [ns], channel and content of each message of some channels.
-
-    Parameters
-    ----------
-    file
-        The MCAP file.
-    chunks
-        The library's indexes of its chunks.
-    channels
-        Numbers of the channels.
-    """
+    """Time of recording [ns], channel and content of each message of some channels."""
     wanted = frozenset(channels)
     held = [c for c in chunks if not c.message_index_offsets or wanted & c.message_index_offsets.keys()]
     held.sort(key=attrgetter("message_start_time", "chunk_start_offset"))

@@ -28,13 +28,7 @@ _STRATA_DRAWN = ("one_exact", "two_exact", "unknown_wrong_name", "mixed_known_ke
 
 
 def blind_page(values: Mapping[str, Any]) -> str:
-    """The self-contained HTML page of a ``score.json``.
-
-    Parameters
-    ----------
-    values
-        Schema ``fogml.blind_score/1``.
-    """
+    """The self-contained HTML page of a ``score.json``."""
     methods = values["methods"]
     name = headline(methods)
     judged, rows = methods[name], methods[name]["rows"]

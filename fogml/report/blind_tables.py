@@ -113,13 +113,7 @@ def reality_words(name: str) -> str:
 
 
 def by_reality_table(parts: Mapping[str, Sequence[Mapping[str, Any]]]) -> Table:
-    """The wanted figures: a column for all cases, and one for each reality where there are several.
-
-    Parameters
-    ----------
-    parts
-        ``by_reality`` of a method in ``score.json``.
-    """
+    """The wanted figures: a column for all cases, and one for each reality where there are several."""
     names = [name for name in parts if len(parts) > 2 or name != "all"]
     rows = []
     for place, row in enumerate(parts[names[0]]):
@@ -134,13 +128,7 @@ def by_reality_table(parts: Mapping[str, Sequence[Mapping[str, Any]]]) -> Table:
 
 
 def by_form_table(cells: Sequence[Mapping[str, Any]]) -> Table:
-    """Single effects: first name's class right, exact, called unknown, by distance of form and d'.
-
-    Parameters
-    ----------
-    cells
-        ``by_form`` of a method in ``score.json``.
-    """
+    """Single effects: first name's class right, exact, called unknown, by distance of form and d'."""
     rows = []
     for cell in cells:
         low, high = cell["d_prime"]

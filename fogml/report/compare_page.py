@@ -158,15 +158,7 @@ _MOST_SERIES = 4
 
 
 def rms_bars(judgements: Mapping[str, Judgement], order: Sequence[str]) -> Drawing:
-    """Rms of the worst test run per model as bars, each test run as a mark, and the floor.
-
-    Parameters
-    ----------
-    judgements
-        By model name.
-    order
-        Names, the best first.
-    """
+    """Rms of the worst test run per model as bars, each test run as a mark, and the floor."""
     worst = [max(run.after.rms for run in judgements[name].test) for name in order]
     stability = [max(run.after.bias_stability for run in judgements[name].test) for name in order]
     runs = judgements[order[0]].test

@@ -39,11 +39,6 @@ class RunSection:
 def gap_page(found: Diagnosis) -> str:
     """The self-contained HTML page of a diagnosis.
 
-    Parameters
-    ----------
-    found
-        As :func:`fogml.gap.diagnose` gives it.
-
     Returns
     -------
     str

@@ -157,17 +157,6 @@ def error_rates(
 ) -> dict[str, Any]:
     """What of a table by reality tells how often the diagnosis is right.
 
-    Parameters
-    ----------
-    rows
-        Those of all cases, as `fogml.blind.scoring.by_reality` gives them.
-    cases
-        How many are of each reality.
-    seeds
-        That the cases were drawn with.
-    final
-        Whether nothing was developed on them.
-
     Returns
     -------
     dict

@@ -76,15 +76,7 @@ def monitor_page(monitor: Mapping[str, Any]) -> str:
 
 
 def unit_page(unit: Mapping[str, Any], limit: float) -> str:
-    """The self-contained HTML page of one unit of a ``monitor.json``.
-
-    Parameters
-    ----------
-    unit
-        An entry of ``units``.
-    limit
-        The ``runs_between_false_alarms``.
-    """
+    """The self-contained HTML page of one unit of a ``monitor.json``."""
     label = unit_label(unit)
     last = unit["runs"][-1]
     beyond = last["beyond_interval"]

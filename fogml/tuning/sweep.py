@@ -130,15 +130,6 @@ def run_sweep(plan: Plan, workers: int = 1, progress: Progress | None = None) ->
     Several processes, here or on other machines, may run the same plan at once; each ends when
     the trials asked for are finished.
 
-    Parameters
-    ----------
-    plan
-        What to do.
-    workers
-        Processes; with one, trials run in this process.
-    progress
-        Called with (finished trials, what was tried last).
-
     Raises
     ------
     InputError

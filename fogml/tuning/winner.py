@@ -26,13 +26,6 @@ DEFAULT, AUTO = "default", "auto"
 def reference_choices(runs: Sequence[Run], seed: int = 0) -> dict[str, Choice]:
     """The choices that a sweep's winner is held against, by name.
 
-    Parameters
-    ----------
-    runs
-        Training runs.
-    seed
-        Seed of the networks.
-
     Raises
     ------
     InputError

@@ -34,19 +34,7 @@ def work(
     held_out: HeldOut,
     progress: Callable[[int, str], None] | None = None,
 ) -> None:
-    """Run trials until those asked for are finished, by this worker and others.
-
-    Parameters
-    ----------
-    study
-        The plan's study.
-    plan
-        What to do.
-    held_out
-        What trials are judged on.
-    progress
-        Called with (finished, what was tried last).
-    """
+    """Run trials until those asked for are finished, by this worker and others."""
     recover = Recovery(plan.heartbeat_s)
     while True:
         recover(study)

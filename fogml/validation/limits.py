@@ -71,11 +71,6 @@ STRICT_CODES = ("small_temperature_span", "outside_training", "seen_in_training"
 def hold_strict(findings: Iterable[tuple[str, Sequence[Finding]]]) -> None:
     """Raise for the first finding that strictness does not allow.
 
-    Parameters
-    ----------
-    findings
-        Name of each run with its findings.
-
     Raises
     ------
     InputError

@@ -125,15 +125,7 @@ class Regression:
         return Fit(found[:k], found[k:], se[k:], rest)
 
     def prediction(self, runs: Stack, chosen: Sequence[Atom]) -> Prediction:
-        """The recalibrated twin and the fitted model with some atoms, on some runs.
-
-        Parameters
-        ----------
-        runs
-            Fit or held-out runs.
-        chosen
-            Atoms of the model.
-        """
+        """The recalibrated twin and the fitted model with some atoms, on some runs."""
         nothing = self.fit(np.zeros((len(self.target), 0)))
         fitted = nothing
         if chosen:

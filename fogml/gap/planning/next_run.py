@@ -62,13 +62,6 @@ def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
 
     What goes with temperature comes that much later after power-on than it did, what goes with power-on does
     not, and what comes anew each time does neither. None where the unknown is too short for that in all runs.
-
-    Parameters
-    ----------
-    found
-        The inference.
-    every
-        All causes of the likeliest set.
     """
     scene = found.scene
     unknown = [m for m in every.members if found.kind(m) == "unknown"]

@@ -118,13 +118,6 @@ def finely(tried: Sequence[Tried], merit: Callable[[Design], float]) -> list[Tri
     """The best design and runners-up with their merits by a finer reckoning, the most worth first.
 
     A runner-up is shorter than those before it, or gives more.
-
-    Parameters
-    ----------
-    tried
-        As `search` gives them.
-    merit
-        As for `search`, at a finer sampling.
     """
     pool = [*tried[:FINALISTS], *_shorter(tried)]
     fine = [Tried(t.design, merit(t.design), t.hours) for t in dict.fromkeys(pool)]
