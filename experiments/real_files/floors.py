@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.real_files.section import Section, table
 from fogml.runs.run import Run
-from fogml.signals.floor import realised_noise_floor
+from fogml.signals.averages import block_averages
 from fogml.twin.simulate import simulate
 from fogml.validation.floors import floor_of_run
 
@@ -25,7 +25,7 @@ def figures(runs: int) -> dict[str, Any]:
         made = simulate("multi-point-cycle", "tactical", sample_s=2.0, seed=seed, truth=True)
         assert made.truth is not None
         run, noise = made.run, made.run.gyro_deg_h - made.truth.noise_free
-        realised.append(realised_noise_floor(run.time, noise, AVERAGING_S))
+        realised.append(float(block_averages(run.time, noise, window_s=AVERAGING_S).values[0].std()))
         still = Run.from_columns("static", time=run.time, gyro=noise, T=np.full(len(run), 25.0))
         every = np.ones(len(run), dtype=np.bool_)
         floor = floor_of_run(run, every, run.error_deg_h, AVERAGING_S)

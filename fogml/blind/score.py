@@ -16,24 +16,9 @@ from fogml.blind.scoring.answers import read_answer
 from fogml.blind.scoring.marks import Mark, mark
 from fogml.blind.scoring.marks_file import Marks, part_of
 from fogml.blind.scoring.table import BY_KEY
-from fogml.blind.scoring.values import score_values
 from fogml.blind.truth import Truth, read_truth
 from fogml.errors import InputError, known_are
 from fogml.processes import in_processes
-
-
-def score(
-    folder: BlindFolder,
-    methods: Sequence[str] | None = None,
-    final: Path | None = None,
-    progress: Progress | None = None,
-    workers: int = 1,
-) -> dict[str, Any]:
-    """Score the answers of a suite, as JSON-ready values of schema ``fogml.blind_score/1``.
-
-    Takes and refuses what `gather` does; the use of a final seed is added to its ledger.
-    """
-    return score_values(gather(folder, methods, final, progress, workers), final)
 
 
 def gather(

@@ -17,14 +17,11 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray, IntArray
-from fogml.errors import InputError
 from fogml.intervals import MEDIAN_SIZE, Z90
 from fogml.signals import large
-from fogml.signals.allan import Segments, segment_bounds
-from fogml.signals.averages import FastNoise, averages_variance, block_averages, fast_noise
+from fogml.signals.averages import FastNoise, averages_variance, fast_noise
 from fogml.signals.noise_spectrum import Rows, spectrum_of
 from fogml.signals.output_filters import SpectrumTerms
 from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel
@@ -161,63 +158,6 @@ class FloorModel:
         return Floor(value, value * float(np.exp(-Z90 * spread)), value * float(np.exp(Z90 * spread)), source)
 
 
-def noise_floor(
-    y: ArrayLike,
-    sample_s: float,
-    averaging_s: float,
-    *,
-    segments: Segments | None = None,
-    columns: Columns | None = None,
-    drifts: bool = True,
-) -> Floor:
-    """The noise floor of averages of a series, drift kept out.
-
-    The density up to ten cycles in an averaging time is fitted by white noise, quantisation and flicker, and
-    beside them by what a drift makes; flicker is weighed by its evidence, so that nothing hangs on a
-    hard choice and the floor moves with its data.
-
-    Parameters
-    ----------
-    y
-        Evenly sampled values, shape (n,), in any unit.
-    sample_s
-        Sample interval [s].
-    averaging_s
-        Averaging time [s].
-    segments
-        Parts of y between gaps, as slices or (start, stop); by default all of y is one.
-    columns
-        What a drift follows, slow: gives them at rows of y, shape (rows, p); their constants are integrated
-        out.
-    drifts
-        Whether noise that rises like a random walk counts as drift; for a static run it is the gyro's own.
-
-    Raises
-    ------
-    InputError
-        If a time is not positive, values are not finite, or no segment has three samples.
-
-    Notes
-    -----
-    Spikes, steps and loud bursts are left out. Flicker that the run does not tell from white noise is
-    missed in part, and the interval says so.
-    """
-    values = np.asarray(y, dtype=np.float64)
-    if not (sample_s > 0 and averaging_s > 0 and np.isfinite(sample_s) and np.isfinite(averaging_s)):
-        raise InputError(
-            f"noise floor: sample interval {sample_s} s and averaging time {averaging_s} s must be positive"
-        )
-    starts, stops = segment_bounds(len(values), segments)
-    longest = int((stops - starts).max(initial=0))
-    if longest < 3:
-        raise InputError(f"noise floor: three samples in a row are needed, the longest stretch has {longest}")
-    if not np.isfinite(values.mean()):
-        raise InputError("noise floor: values that are not finite; leave them out first")
-    windows = max(int(np.sum(stops - starts) * sample_s / averaging_s), 2)
-    model = floor_model(values, sample_s, averaging_s, starts, stops, columns, drifts=drifts)
-    return Floor(0.0, 0.0, 0.0) if model is None else model.floor(averaging_s, windows)
-
-
 def floor_model(
     values: FloatArray,
     sample_s: float,
@@ -228,7 +168,26 @@ def floor_model(
     *,
     drifts: bool = True,
 ) -> FloorModel | None:
-    """The noise models behind a floor; None where there is no noise. Parameters as in `noise_floor`."""
+    """The noise models behind the floor of a series' averages, drift kept out; None where there is no noise.
+
+    The density up to ten cycles in an averaging time is fitted by white noise, quantisation and flicker, and
+    beside them by what a drift makes; flicker is weighed by its evidence, so that nothing hangs on a
+    hard choice and the floor moves with its data. Spikes, steps and loud bursts are left out. Flicker that
+    the run does not tell from white noise is missed in part, and the interval says so.
+
+    Parameters
+    ----------
+    values
+        Evenly sampled, finite, shape (n,), in any unit, `sample_s` apart [s].
+    averaging_s
+        Averaging time [s].
+    starts, stops
+        Parts of the values between gaps.
+    columns
+        What a drift follows, slow: gives them at rows, shape (rows, p); their constants are integrated out.
+    drifts
+        Whether noise that rises like a random walk counts as drift; for a static run it is the gyro's own.
+    """
     parts = quiet_parts(values, starts, stops, max(int(averaging_s / sample_s / PER_WINDOW), 1))
     stretches = [without_spikes(values[a:b]) for a, b in parts]
     if all(np.ptp(part) == 0.0 for part in stretches):
@@ -279,31 +238,6 @@ def _from(columns: Columns, first: int) -> Rows:
 
 def _subsets(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     return chain.from_iterable(combinations(names, size) for size in range(len(names) + 1))
-
-
-def realised_noise_floor(time: ArrayLike, noise: ArrayLike, averaging_s: float) -> float:
-    """Standard deviation of the averages of a known noise: what it realised in that very run.
-
-    For synthetic data. Windows are those of `fogml.signals.averages.block_averages`.
-
-    Parameters
-    ----------
-    time
-        Sample times [s], shape (n,).
-    noise
-        The noise alone, shape (n,), in any unit.
-    averaging_s
-        Averaging time [s].
-
-    Raises
-    ------
-    InputError
-        If fewer than two windows fit.
-    """
-    averages = block_averages(time, noise, window_s=averaging_s)
-    if len(averages) < 2:
-        raise InputError(f"noise floor: {len(averages)} average over {averaging_s:g} s, two are needed")
-    return float(averages.values[0].std())
 
 
 def _covariance(model: SpectrumModel, fit: SpectrumFit) -> FloatArray:

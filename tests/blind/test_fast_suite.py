@@ -12,7 +12,8 @@ import pytest
 from fogml.blind.folders import BlindFolder
 from fogml.blind.make import make_cases
 from fogml.blind.run import RunPlan, run_cases
-from fogml.blind.score import gate, score
+from fogml.blind.score import gate, gather
+from fogml.blind.scoring.values import score_values
 
 SEED = 20
 COUNTS = {"nothing": 1, "one": 2}
@@ -27,7 +28,7 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         suite = BlindFolder(folder / kind)
         make_cases(suite.path, count, SEED + number, sample_s=20.0, workers=1, kinds=[kind])
         assert run_cases(RunPlan(suite, workers=1)) == (count, 0)
-        scored[kind] = score(suite)
+        scored[kind] = score_values(gather(suite))
     return scored
 
 

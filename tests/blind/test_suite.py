@@ -14,8 +14,9 @@ from fogml.blind.baselines.oracle import oracle
 from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.methods import METHODS, load_method
 from fogml.blind.relatives import relatives_of
-from fogml.blind.score import gate, score, wanted_gates
+from fogml.blind.score import gate, gather, wanted_gates
 from fogml.blind.scoring.table import BY_KEY
+from fogml.blind.scoring.values import score_values
 from fogml.blind.truth import read_truth
 from fogml.cli.main import app
 from fogml.errors import InputError
@@ -103,7 +104,7 @@ def test_relatives_are_those_of_like_signature(suite: BlindFolder) -> None:
 
 
 def test_score_page_and_gates(suite: BlindFolder) -> None:
-    values = score(suite)
+    values = score_values(gather(suite))
     assert set(values["methods"]) == {"abstain", "bic", "oracle"}
     assert values["cases"] == 4 and values["kinds"]["one"] == 1
     figures = {row["key"]: row["value"] for row in values["methods"]["oracle"]["rows"]}
@@ -137,7 +138,7 @@ def test_a_truth_that_changed_is_not_scored(tmp_path: Path) -> None:
     path = folder.truth / "0001.json"
     path.write_text(path.read_text().replace('"nothing"', '"one"'))
     with pytest.raises(InputError, match="changed since"):
-        score(folder, ["abstain"])
+        gather(folder, ["abstain"])
 
 
 @pytest.mark.parametrize("name", METHODS)
