@@ -18,7 +18,7 @@ from fogml.gap import diagnose
 from fogml.gap.model import NoisePrior
 from fogml.gap.result import Diagnosis
 from fogml.outputs import whole_file
-from fogml.report import gap_page
+from fogml.report.gap_page import gap_page
 
 HERE = Path(__file__).parent
 LEGS = ("down", "up", "last down")

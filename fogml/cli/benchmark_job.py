@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from fogml.cli.benchmark import MakeSettings, RunSettings, ScoreSettings
 from fogml.cli.terminal import Terminal
@@ -43,16 +42,16 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
 def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     """Answer a track by each method, and say how many cases failed."""
     from fogml.benchmark.answers import entry_plan
-    from fogml.blind.run import run_cases
+    from fogml.blind.run import RunPlan, run_cases
+    from fogml.cli.blind_job import answer
 
     if not settings.methods:
         raise InputError("no method is given; name one: --method auto")
     if len(settings.methods) > 1 and settings.name:
         raise InputError("--name: the answers of several methods can't have one name")
-    told: dict[str, Any] = {}
-    config = settings.in_full().yaml("benchmark run", "run.yaml")
-    for method in settings.methods:
-        plan = entry_plan(
+
+    def plan_of(method: str) -> RunPlan:
+        return entry_plan(
             settings.folder(),
             settings.track,
             method,
@@ -64,18 +63,9 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
             retry=settings.retry,
             seed=settings.seed,
         )
-        with terminal.work(method, total=len(plan.left())) as work:
 
-            def progress(case: str, work: Any = work, method: str = method) -> None:
-                work.advance(doing=f"{method}: {case}")
-
-            answered, failed = run_cases(plan, progress)
-        plan.answers.mkdir(parents=True, exist_ok=True)
-        with whole_file(plan.answers / "run.yaml") as partial:
-            partial.write_text(config, encoding="utf-8")
-        told[str(plan.name)] = {"answered": answered, "failed": failed}
-        terminal.say(f"{method}: {counted(answered, 'case')} answered in {plan.answers}, {failed} failed")
-    terminal.result(told)
+    config = settings.in_full().yaml("benchmark run", "run.yaml")
+    answer(settings.methods, plan_of, lambda method: run_cases, config, terminal)
 
 
 def score_and_write(settings: ScoreSettings, terminal: Terminal) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from fogml.json_files import write_json
 from fogml.outputs import whole_file, whole_folder
 
 if TYPE_CHECKING:
+    from fogml.blind.run import RunPlan
     from fogml.blind.scoring.marks_file import Marks
 
 _REPORTS = "reports"
@@ -62,7 +63,6 @@ def _reports(folder: BlindFolder, method: str, case: str) -> list[Path]:
     return [*drawn, *(folder.answers(method) / case / f"{name}.json" for name in ("gap", "outcome"))]
 
 
-LEDGER = "experiments/gap_blind/final_uses.json"
 _BASELINES = "baselines"
 
 
@@ -127,10 +127,9 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     cost = {"cost_of_false_name": settings.cost_of_false_name}
     if settings.cost_of_false_name != 1.0 and DIAGNOSIS not in methods:
         raise InputError(f"--cost-of-false-name: no method but '{DIAGNOSIS}' takes it")
-    told = {}
-    config = settings.in_full().yaml("blind run", "run.yaml")
-    for method in methods:
-        plan = RunPlan(
+
+    def plan_of(method: str) -> RunPlan:
+        return RunPlan(
             folder=settings.folder(),
             method=method,
             name=settings.name or (method if ":" not in method else method.partition(":")[2]),
@@ -143,15 +142,32 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
             seed=settings.seed,
             options=cost if method == DIAGNOSIS else {},
         )
+
+    config = settings.in_full().yaml("blind run", "run.yaml")
+    answer(methods, plan_of, lambda method: run_oracle if method == ORACLE else run_cases, config, terminal)
+
+
+def answer(
+    methods: Sequence[str],
+    plan_of: Callable[[str], RunPlan],
+    run_of: Callable[[str], Callable[..., tuple[int, int]]],
+    config: str,
+    terminal: Terminal,
+) -> None:
+    """Answer cases by each method, leave the configuration beside the answers, and say how many failed."""
+    told = {}
+    for method in methods:
+        plan = plan_of(method)
         with terminal.work(method, total=len(plan.left())) as work:
 
             def progress(case: str, work: Any = work, method: str = method) -> None:
                 work.advance(doing=f"{method}: {case}")
 
-            answered, failed = (run_oracle if method == ORACLE else run_cases)(plan, progress)
+            answered, failed = run_of(method)(plan, progress)
+        plan.answers.mkdir(parents=True, exist_ok=True)
         with whole_file(plan.answers / "run.yaml") as partial:
             partial.write_text(config, encoding="utf-8")
-        told[plan.name] = {"answered": answered, "failed": failed}
+        told[str(plan.name)] = {"answered": answered, "failed": failed}
         terminal.say(f"{method}: {counted(answered, 'case')} answered in {plan.answers}, {failed} failed")
     terminal.result(told)
 

@@ -28,7 +28,7 @@ def compare_and_write(settings: CompareSettings, terminal: Terminal) -> bool:
         values = comparison_json(comparison)
         write_json(folder / "compare.json", values)
         with terminal.work("drawing"):
-            from fogml.report import compare_page
+            from fogml.report.compare_page import compare_page
 
             page = compare_page(comparison.judgements, comparison.failed)
         (folder / "compare.html").write_text(page, encoding="utf-8")
@@ -108,7 +108,7 @@ def _print(comparison: Comparison, terminal: Terminal) -> None:
             rows.append([label, str(judgement.model["parameters"]), *(number(value) for value in figures)])
     run = next(iter(comparison.judgements.values())).test[0]
     terminal.table(
-        f"After compensation, {run.averaging_s:g} s averages, deg/h; noise floor {floor_words(run, number)}",
+        f"After compensation, {run.averaging_s:g} s averages, deg/h; noise floor {floor_words(run)}",
         ["model", "parameters", "rms", "bias", "bias stability", "range"],
         rows,
     )

@@ -32,7 +32,7 @@ def demo_and_write(settings: DemoSettings, terminal: Terminal) -> None:
                 work.doing(f"axis {axis}")
                 judgements[axis], cubics[axis] = _axis(folder / axis, axis, settings, Terminal(quiet=True))
                 work.advance()
-        from fogml.report import index_page
+        from fogml.report.index_page import index_page
 
         page = index_page(judgements, title="A chamber cycle, three axes", beside={CUBIC: cubics})
         (folder / "index.html").write_text(page, encoding="utf-8")

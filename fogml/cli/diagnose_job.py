@@ -158,7 +158,7 @@ def _column(
 
 def write_gap(folder: Path, found: Diagnosis) -> None:
     """``gap.json``, its page, that of what-ifs, and the programme of a further run."""
-    from fogml.report import gap_page
+    from fogml.report.gap_page import gap_page
 
     write_json(folder / "gap.json", found.as_dict())
     (folder / "gap.html").write_text(gap_page(found), encoding="utf-8")

@@ -106,14 +106,9 @@ class UnitWork:
         return {
             "model": name,
             "met": met,
-            "worst": {
-                "run": run["run"],
-                "averaging_s": run["averaging_s"],
-                "before": run["before"]["rms"],
-                "after": run["after"]["rms"],
-                "floor": run["floor"],
-                "outside_training": run["outside_training"],
-            },
+            "worst": {key: run[key] for key in ("run", "averaging_s")}
+            | {key: run[key]["rms"] for key in ("before", "after")}
+            | {key: run[key] for key in ("floor", "outside_training")},
             "notes": models[name]["notes"],
         }
 
@@ -130,16 +125,7 @@ class UnitWork:
             "verdict": found.verdict,
             "effects": [item.effect for item in found.named],
             "diagnosis": unit_diagnosis(found, unit.covariates),
-            "worst": None
-            if worst is None
-            else {
-                "run": worst.run,
-                "averaging_s": worst.averaging_s,
-                "before": worst.before,
-                "after": worst.after,
-                "floor": worst.floor,
-                "outside_training": None,
-            },
+            "worst": worst and _worst(worst, worst.before, worst.after, None),
         }
 
     def _acceptance(self, unit: Unit, folder: Path) -> dict[str, Any]:
@@ -200,13 +186,11 @@ def _told(judgement: Judgement) -> dict[str, Any]:
     return {
         "model": str(judgement.model["kind"]),
         "met": judgement.met,
-        "worst": {
-            "run": worst.run,
-            "averaging_s": worst.averaging_s,
-            "before": worst.before.rms,
-            "after": worst.after.rms,
-            "floor": worst.floor,
-            "outside_training": worst.outside_training,
-        },
+        "worst": _worst(worst, worst.before.rms, worst.after.rms, worst.outside_training),
         "notes": [str(note) for note in (*judgement.notes, *judgement.model.get("notes", ()))],
     }
+
+
+def _worst(run: Any, before: float, after: float, outside: float | None) -> dict[str, Any]:
+    told = {"run": run.run, "averaging_s": run.averaging_s, "before": before, "after": after}
+    return {**told, "floor": run.floor, "outside_training": outside}

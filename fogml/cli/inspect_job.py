@@ -33,7 +33,7 @@ def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:
             return inspection_json(runs)
 
     def page(values: dict[str, Any]) -> str:
-        from fogml.report import inspect_page
+        from fogml.report.inspect_page import inspect_page
 
         return inspect_page(runs, values)
 

@@ -30,7 +30,7 @@ def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -
         with terminal.work(f"reading {file}"):
             return misalignment_json(read_measurements(file, settings.state_angles), settings.cross_tilt)
 
-    page = "fogml.report:misalignment_page"
+    page = "fogml.report.misalignment_page:misalignment_page"
     tell("lab misalignment", settings, terminal, make, page, _print_misalignment)
 
 
@@ -124,7 +124,7 @@ def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:
     def make() -> dict[str, Any]:
         return _recorded(settings, terminal) if settings.positions else _simulated(settings)
 
-    tell("lab north", settings, terminal, make, "fogml.report:north_page", _print_north)
+    tell("lab north", settings, terminal, make, "fogml.report.north_page:north_page", _print_north)
 
 
 def _check(settings: NorthSettings) -> None:

@@ -36,7 +36,7 @@ def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
             terminal.say(f"{name}:\n{text}")
 
     make = partial(_noise, settings, terminal)
-    tell("noise", settings, terminal, make, "fogml.report:noise_page", show, beside)
+    tell("noise", settings, terminal, make, "fogml.report.noise_page:noise_page", show, beside)
 
 
 def _for_others(settings: NoiseSettings, values: dict[str, Any]) -> list[tuple[str, str]]:

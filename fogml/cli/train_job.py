@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -30,12 +29,7 @@ if TYPE_CHECKING:
 
 
 def train(settings: TrainSettings, terminal: Terminal) -> bool:
-    """As `train_and_write`; whether every limit is met."""
-    return train_and_write(settings, terminal).met
-
-
-def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:
-    """Fit, judge, write the results into ``settings.out``, and print them."""
+    """Fit, judge, write the results into ``settings.out``, and print them; whether every limit is met."""
     check_settings(settings)
     # The folder is asked for first: nobody should train for an hour and then find it closed.
     with whole_folder(settings.out) as folder:
@@ -45,7 +39,7 @@ def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:
     print_judgement(judgement, terminal)
     terminal.result(_report(settings, judgement))
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'report.html'}")
-    return judgement
+    return judgement.met
 
 
 def check_settings(settings: TrainSettings | CompareSettings) -> None:
@@ -175,7 +169,9 @@ def write_results(
     """Write model, report, pages, spreadsheet and settings into a folder."""
     from fogml.export.documentation import documentation_or_none
     from fogml.models.saved import save_model
-    from fogml.report import certificate, spreadsheet, train_page
+    from fogml.report.certificate import certificate
+    from fogml.report.spreadsheet import spreadsheet
+    from fogml.report.train_page import train_page
 
     with terminal.work("writing"):
         save_model(model, folder / "model")
@@ -199,7 +195,7 @@ def _report(settings: TrainSettings, judgement: Judgement) -> dict[str, Any]:
     return values
 
 
-def floor_words(run: RunJudgement, number: Callable[[float], str]) -> str:
+def floor_words(run: RunJudgement) -> str:
     """A run's floor with its interval."""
     told = number(run.floor)
     if run.floor_ci90 is None:
@@ -218,7 +214,7 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
         for when, figures in (("before", run.before), ("after", run.after)):
             values = (figures.bias, figures.bias_stability, figures.range, figures.rms)
             rows.append([f"{run.run} {when}", *(number(value) for value in values)])
-        rows.append([f"{run.run} noise floor", "–", floor_words(run, number), "–", "–"])
+        rows.append([f"{run.run} noise floor", "–", floor_words(run), "–", "–"])
     averaging = f"{judgement.test[0].averaging_s:g} s averages, deg/h"
     synthetic = any(run.facts.synthetic for run in (*judgement.train, *judgement.test))
     title = f"{judgement.model['kind']} on {'runs' if len(judgement.test) > 1 else 'the run'} not trained on"

@@ -16,7 +16,7 @@ from fogml.blind.scoring.table import BY_KEY
 from fogml.blind.scoring.values import score_values
 from fogml.blind.truth import Kind, Truth
 from fogml.errors import InputError
-from fogml.report import blind_page
+from fogml.report.blind_page import blind_page
 from fogml.report.blind_tables import headline
 from tests.blind.test_marks import answer, truth
 

@@ -20,7 +20,7 @@ from fogml.blind.scoring.values import score_values
 from fogml.blind.truth import read_truth
 from fogml.cli.main import app
 from fogml.errors import InputError
-from fogml.report import blind_page
+from fogml.report.blind_page import blind_page
 from tests.blind.suites import HandMade, make_suite
 
 HYSTERESIS = {"thermal_hysteresis": (0.06, {"half_width": 9.0})}

@@ -9,8 +9,7 @@ from datetime import UTC, date, datetime
 import numpy as np
 import pytest
 
-from fogml.report import certificate
-from fogml.report.certificate import by_unit
+from fogml.report.certificate import by_unit, certificate
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
 from fogml.validation.certified import at_constant_temperature, sample_deviation, set_up, with_uncertainty

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from fogml.gap.result import HowFar
 from fogml.gap.result_parts import Where
-from fogml.report import gap_page
-from fogml.report.gap_page import MOST_RUNS_DRAWN
+from fogml.report.gap_page import MOST_RUNS_DRAWN, gap_page
 from fogml.report.gap_tables import causes_table, constants_table
 from fogml.report.gap_words import probability_words, unit_words, with_error
 from fogml.report.words import MISSING

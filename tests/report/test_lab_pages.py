@@ -15,8 +15,9 @@ from fogml.lab.navigation import navigation_costs
 from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.north_schemes import simulated_positions
-from fogml.report import misalignment_page, north_page, train_page
-from fogml.report.misalignment_page import slopes_over_tilts
+from fogml.report.misalignment_page import misalignment_page, slopes_over_tilts
+from fogml.report.north_page import north_page
+from fogml.report.train_page import train_page
 from tests.report.judgements import judgement
 from tests.report.pages import Page
 

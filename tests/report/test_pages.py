@@ -12,9 +12,12 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from fogml.report import compare_page, index_page, inspect_page, noise_page, train_page
-from fogml.report.compare_page import ranked
+from fogml.report.compare_page import compare_page, ranked
+from fogml.report.index_page import index_page
+from fogml.report.inspect_page import inspect_page
+from fogml.report.noise_page import noise_page
 from fogml.report.page import Drawing, _Drawings
+from fogml.report.train_page import train_page
 from fogml.report.words import number
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run

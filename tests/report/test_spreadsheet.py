@@ -12,7 +12,7 @@ import openpyxl
 import pytest
 
 from fogml.errors import InputError
-from fogml.report import spreadsheet
+from fogml.report.spreadsheet import spreadsheet
 from fogml.runs.findings import Finding
 from fogml.validation.results import Judgement, Metrics
 from tests.report.judgements import judged_run, judgement, linear_judgement

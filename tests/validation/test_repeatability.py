@@ -9,7 +9,8 @@ import pytest
 from openpyxl import load_workbook
 
 from fogml.errors import InputError
-from fogml.report import spreadsheet, train_page
+from fogml.report.spreadsheet import spreadsheet
+from fogml.report.train_page import train_page
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.validation.compare import compare
