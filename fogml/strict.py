@@ -16,7 +16,8 @@ CONTENT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=Fal
 """Of `Strict`; a dataclass that has it by `pydantic.with_config` is held to it where it is read."""
 
 if TYPE_CHECKING:
-    Vector = Matrix = FloatArray
+    Vector = FloatArray
+    Matrix = FloatArray
 else:
     _AS_ARRAY = (AfterValidator(partial(np.array, dtype=np.float64)), PlainSerializer(np.ndarray.tolist))
     Vector = Annotated[list[float], *_AS_ARRAY]

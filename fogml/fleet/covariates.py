@@ -123,8 +123,8 @@ class CovariateEffects:
         wanted = ((count,), (count,), (count, width), (count, count), (count + 1, count + 1))
         if any(a.size != math.prod(shape) for a, shape in zip(held, wanted)):
             raise InputError("the fleet's covariates are not understood: sizes don't belong together")
-        square = {"slopes": saved.slopes.reshape(count, width), "spread": saved.spread.reshape(count, count)}
-        return replace(saved, **square)
+        slopes, spread = saved.slopes.reshape(count, width), saved.spread.reshape(count, count)
+        return replace(saved, slopes=slopes, spread=spread)
 
 
 def _number(text: str) -> float | None:
