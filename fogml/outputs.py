@@ -23,8 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.errors import FogmlError, InputError
-from fogml.folders import exchange_whole, has_to_stay, is_folder, nearest_folder
-from fogml.locks import FileLock
+from fogml.folders import FileLock, exchange_whole, has_to_stay, is_folder, nearest_folder
 from fogml.processes import process_is_alive, process_start
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)

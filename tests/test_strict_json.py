@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
-from fogml.strict_json import MOST_DEPTH, content_hash, json_object, parse_json, read_json
+from fogml.json_files import MOST_DEPTH, content_hash, json_object, parse_json, read_json
 
 VALUES = st.recursive(
     st.none()

@@ -8,7 +8,7 @@ from random import Random
 from typing import Any
 
 from experiments.faults import mutate
-from fogml.strict_json import content_hash
+from fogml.json_files import content_hash
 
 _DTYPES = ("F64", "F32", "F16", "BF16", "I64", "I32", "U8", "BOOL", "F8_E5M2", "X")
 _ITEM = {

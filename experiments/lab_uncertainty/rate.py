@@ -13,7 +13,7 @@ from fogml.arrays import FloatArray
 from fogml.lab.rate_json import rate_json
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-from fogml.validation.rate_ladder import nonlinearity_ppm
+from fogml.validation.scale_factor import nonlinearity_ppm
 
 UP = (0.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 BOTH = tuple(sign * rate for rate in UP[1:] for sign in (1.0, -1.0))

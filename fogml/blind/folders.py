@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fogml import strict_json
+from fogml import json_files
 from fogml.errors import InputError
 from fogml.outputs import whole_file
 
@@ -121,7 +121,7 @@ def case_files(folder: Path, seed: int = 0) -> CaseFiles:
 
 def read_json(path: Path) -> dict[str, Any]:
     """The mapping in a JSON file."""
-    values = strict_json.read_json(path, "fogml blind makes, answers and scores cases")
+    values = json_files.read_json(path, "fogml blind makes, answers and scores cases")
     if not isinstance(values, dict):
         raise InputError(f"{path}: a JSON object was expected")
     return values

@@ -14,9 +14,16 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.blind.folders import BlindFolder, write_sums
 from fogml.blind.frame.form import Form, compatible
-from fogml.blind.frame.reckoning import AVERAGING_S, Reckoning, recorded_output
 from fogml.blind.frame.record import World
-from fogml.blind.frame.strength import Acting, Scales, TooWeak, recorded
+from fogml.blind.frame.strength import (
+    AVERAGING_S,
+    Acting,
+    Reckoning,
+    Scales,
+    TooWeak,
+    recorded,
+    recorded_output,
+)
 from fogml.blind.frame.unit import Reality, Unit, UnitRun
 from fogml.blind.plan import FIRST, SAME_TWIN, Plan, Strata, plans, reality
 from fogml.blind.truth import Amount, Runs, Segment, TrueClosed, TrueEffect, Truth, read_truth, write_truth

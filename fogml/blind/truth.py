@@ -18,10 +18,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, printable
-from fogml.json_files import write_json
+from fogml.json_files import read_bytes, write_json
 from fogml.outputs import whole_file
 from fogml.signals.noise_model import NoiseModel
-from fogml.strict_json import read_bytes
 
 SCHEMA = "fogml.blind_truth/1"
 Kind = Literal[

@@ -13,8 +13,7 @@ from click.shell_completion import CompletionItem
 from pydantic.fields import FieldInfo
 
 from fogml.cli.each_axis import do_job
-from fogml.cli.given import HELP_NAMES, Given
-from fogml.cli.help import HelpContext
+from fogml.cli.given import HELP_NAMES, Given, HelpContext
 from fogml.cli.settings import Settings, given_settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, quoted

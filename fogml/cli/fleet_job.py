@@ -15,10 +15,9 @@ from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json, label_of
 from fogml.fleet.tasks import DONE, Task, full_disk
-from fogml.json_files import finite_json, write_json
+from fogml.json_files import finite_json, read_json, write_json
 from fogml.outputs import sole_writer, whole_folder
 from fogml.runs.sources import sources_stamp
-from fogml.strict_json import read_json
 from fogml.tracking import Tracker
 
 

@@ -12,9 +12,9 @@ from pydantic import Field
 from fogml.errors import InputError
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Brought, Compensable, Compensation
+from fogml.json_files import json_object, read_json
 from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
-from fogml.strict_json import json_object, read_json
 
 if TYPE_CHECKING:
     from fogml.cli.model_commands import TrainSettings

@@ -1,11 +1,13 @@
-"""How a setting is given on a command line: said once, beside its type and its default."""
+"""How a setting is given on a command line, said once beside type and default; help with whole names."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
+
+import click
 
 HELP_NAMES = {"help_option_names": ["-h", "--help"]}
 """Settings of every command's and group's context."""
@@ -73,3 +75,24 @@ def option(help: str, *names: str, **more: Any) -> Given:
 def argument(metavar: str, help: str, **more: Any) -> Given:
     """A setting given by its place; `more` as of `Given`."""
     return Given(help, metavar, argument=True, **more)
+
+
+_HYPHEN = "\ue000"
+"""Stands for a hyphen while lines are broken; click breaks at every real one."""
+
+
+class _Formatter(click.HelpFormatter):
+    def write_text(self, text: str) -> None:
+        super().write_text(text.replace("-", _HYPHEN))
+
+    def write_dl(self, rows: Iterable[tuple[str, str]], *args: int, **more: int) -> None:
+        super().write_dl([(name, text.replace("-", _HYPHEN)) for name, text in rows], *args, **more)
+
+    def getvalue(self) -> str:
+        return super().getvalue().replace(_HYPHEN, "-")
+
+
+class HelpContext(click.Context):
+    """The context of a command or group."""
+
+    formatter_class = _Formatter

@@ -15,8 +15,7 @@ from typing import Any
 import click
 
 from fogml import __version__
-from fogml.cli.given import HELP_NAMES, load
-from fogml.cli.help import HelpContext
+from fogml.cli.given import HELP_NAMES, HelpContext, load
 from fogml.errors import FogmlError, did_you_mean, printable
 from fogml.outputs import NO_ROOM
 from fogml.processes import end_as_interrupted, quiet_libraries

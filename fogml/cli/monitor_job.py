@@ -13,7 +13,7 @@ from fogml.cli.runs import check_named_once, open_blocks
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.unit_commands import MonitorSettings
 from fogml.errors import InputError, counted
-from fogml.json_files import finite_json, write_json
+from fogml.json_files import finite_json, read_json, write_json
 from fogml.models.base import DriftModel
 from fogml.monitor.evidence import ChangePrior
 from fogml.monitor.monitor_json import monitor_json
@@ -22,7 +22,6 @@ from fogml.monitor.store import open_store
 from fogml.monitor.watch import watch
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
-from fogml.strict_json import read_json
 
 _SHOWN = 40
 FLEET = "fleet.json"

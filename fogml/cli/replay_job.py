@@ -17,9 +17,8 @@ from fogml.runs.columns import REPLAYED
 from fogml.runs.run import Run
 from fogml.runs.simulated_output import at_times_of, is_simulator_output, read_gnss_ins_sim
 from fogml.runs.writing import BlockWriter, carried_cells, header_cells
-from fogml.twin.between_runs import Storage
 from fogml.twin.replay import replay
-from fogml.twin.replay_after import replay_after
+from fogml.twin.replay_after import Storage, replay_after
 from fogml.twin.truth import Truth, read_truth
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_names

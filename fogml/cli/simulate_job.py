@@ -9,9 +9,9 @@ from fogml.cli.terminal import Terminal, span
 from fogml.cli.twin_commands import SimulateSettings
 from fogml.errors import InputError
 from fogml.runs.facts import facts_from
-from fogml.twin.between_runs import Storage
 from fogml.twin.draws import drawn_twin
 from fogml.twin.programme import load_programme
+from fogml.twin.replay_after import Storage
 from fogml.twin.simulate import default_facts, world_of, write_world
 from fogml.twin.twin_file import load_twin, twin_dict
 from fogml.twin.world import World

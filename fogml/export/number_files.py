@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml import json_files, strict_json
+from fogml import json_files
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.export.plan import Plan
@@ -55,7 +55,7 @@ def read_json(folder: Path, plan: Plan) -> tuple[Plan, Plan]:
     """The plan with the numbers of the JSON file, and with those of the safetensors file."""
     from safetensors.numpy import load_file
 
-    document = strict_json.read_json(folder / JSON_FILE, "export again", most_bytes=1 << 30)
+    document = json_files.read_json(folder / JSON_FILE, "export again", most_bytes=1 << 30)
     plain = {
         name: np.array(entry["values"]).reshape(entry["shape"]) for name, entry in document["arrays"].items()
     }

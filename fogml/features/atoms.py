@@ -17,7 +17,7 @@ from fogml.features.windows import DEFAULT_WINDOW, Window, windowed_values
 from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 from fogml.signals.clock import Clock
-from fogml.signals.memory import MemoryOperator
+from fogml.signals.recursions import MemoryOperator
 
 Operator = Literal["value", "lag", "play", "since_on", "beyond", "diff", "d", "sign"]
 

@@ -20,7 +20,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray
 from fogml.features.own import Function, Recursion, State, declare
 from fogml.features.traced import decayed, forgotten, larger, smaller, where
-from fogml.signals.memory import Lag, Play
+from fogml.signals.recursions import Lag, Play
 
 _GONE = 1e-3
 # What is left of a decay where it tells no more how long ago power-on was.

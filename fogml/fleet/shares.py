@@ -4,7 +4,7 @@ Units are exchangeable. Each has a cause with the probability pi, the share of t
 Jeffreys'; the data of a unit are likelier by the Bayes factor B with the cause than without, so that those of
 all have the likelihood prod (pi B + 1 - pi). Probabilities that a diagnosis states of one unit alone rest on
 how rare causes are among all gyros: on a line where most have one, the same data say more. A unit stands
-apart where its size does not fit what the others foretell (`fogml.signals.random_effects`); of all units told
+apart where its size does not fit what the others foretell (`fogml.signals.distributions`); of all units told
 so no more than the stated share is wrong in the mean (Y. Benjamini & Y. Hochberg, J. R. Stat. Soc. B 57,
 1995).
 """
@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray
 from fogml.intervals import TAILS
-from fogml.signals.distributions import student_ppf, student_sf
-from fogml.signals.random_effects import random_effects
+from fogml.signals.distributions import random_effects, student_ppf, student_sf
 
 _STEPS = 4000
 _SHARES: FloatArray = np.sin(0.5 * np.pi * (np.arange(_STEPS) + 0.5) / _STEPS) ** 2

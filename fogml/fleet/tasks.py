@@ -14,11 +14,10 @@ from pydantic import Field
 from fogml import __version__
 from fogml.errors import FogmlError, InputError
 from fogml.fleet.manifest import Unit
-from fogml.json_files import write_json
+from fogml.json_files import read_json, write_json
 from fogml.outputs import NO_ROOM, whole_file
 from fogml.runs.sources import run_sources, sources_stamp
 from fogml.strict import Strict, strictly
-from fogml.strict_json import read_json
 
 OUTCOME_SCHEMA, OUTCOME = "fogml.outcome/1", "outcome.json"
 DONE, FAILED = "done", "failed"

@@ -14,11 +14,10 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
-from fogml.json_files import finite_json
+from fogml.json_files import finite_json, json_object, read_json
 from fogml.lab.acceptance import ACCEPTED, INCOMPLETE, NO_LIMITS, REJECTED
 from fogml.lab.acceptance import SCHEMA as ACCEPTANCE
 from fogml.lab.acceptance_rows import QUANTITIES
-from fogml.strict_json import json_object, read_json
 
 SCHEMA = "fogml.batch/1"
 REPORT = "acceptance.json"

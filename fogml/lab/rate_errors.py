@@ -16,7 +16,7 @@ from fogml.runs.run import Run
 from fogml.signals.averages import window_means
 from fogml.signals.distributions import normal_ppf, student_ppf, students_ppf
 from fogml.signals.restricted import absent_or_not, weighed_models
-from fogml.validation.rate_ladder import LEAST_LEVELS
+from fogml.validation.scale_factor import LEAST_LEVELS
 
 ONE_SIGMA = 0.682689492137
 """What a standard error on either side of a normal value holds."""

@@ -15,7 +15,7 @@ import numpy as np
 from fogml.arrays import FloatArray, IndexArray
 from fogml.lab.rate_errors import Spread, spread_of
 from fogml.lab.rate_pieces import ROUND_OFF_DEG_H, Plateaus, merged
-from fogml.validation.rate_ladder import LEAST_LEVELS, nonlinearity_ppm
+from fogml.validation.scale_factor import LEAST_LEVELS, nonlinearity_ppm
 
 LEAST_FOR_DRIFT = 3
 """Plateaus that a straight drift needs: two would leave nothing over."""

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fogml.errors import InputError, quoted
-from fogml.json_files import json_text
+from fogml.json_files import content_hash, json_object, json_text, read_bytes, read_json
 from fogml.models.arrays import arrays_from_bytes, arrays_to_bytes
 from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
@@ -37,7 +37,6 @@ from fogml.models.names import PRESETS
 from fogml.models.regressors import SKOPS, own_regressors
 from fogml.outputs import whole_folder
 from fogml.strict import Strict, as_written, strictly
-from fogml.strict_json import content_hash, json_object, read_bytes, read_json
 
 SCHEMA = "fogml.model/2"
 MODEL_FILE = "model.json"

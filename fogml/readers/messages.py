@@ -19,9 +19,8 @@ from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from fogml.readers.columns import Column, Container
+from fogml.readers.columns import Column, Container, Rows
 from fogml.readers.message_fields import numbers, stamps_in, values_of
-from fogml.readers.spool import Rows
 
 _RECORD = struct.Struct("<BQ")
 """Kind of a record, and bytes that follow."""

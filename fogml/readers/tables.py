@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.readers.columns import MOST_COLUMNS, Column, Container
-from fogml.readers.spool import BLOCK_BYTES, Rows, Spool
+from fogml.readers.columns import BLOCK_BYTES, MOST_COLUMNS, Column, Container, Rows, Spool
 
 _UNIT_PROPERTIES = ("unit_string", "Unit", "unit", "NI_UnitDescription", "Units")
 

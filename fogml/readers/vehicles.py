@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.readers.columns import Container
-from fogml.readers.spool import Rows
+from fogml.readers.columns import Container, Rows
 
 _HEADER, _HEADER_BYTES = b"\xa3\x95", 3  # of a DataFlash message, with its type before its fields
 _FORMAT_TYPE, _FORMAT_BYTES = 0x80, 89  # of the message that defines the others

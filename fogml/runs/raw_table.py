@@ -9,11 +9,11 @@ from typing import Any
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, quoted
+from fogml.json_files import parse_json
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.facts import NAMES, Facts, facts_from
 from fogml.runs.findings import Finding
 from fogml.runs.reader_process import StoredArray, StoredFile
-from fogml.strict_json import parse_json
 from fogml.yaml_text import parse_yaml
 
 FACTS_KEY = "fogml.facts"

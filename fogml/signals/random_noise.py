@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray
+from fogml.signals.bases import sine
 from fogml.signals.compiled import kernel
 from fogml.signals.modes import phi_functions
-from fogml.signals.waves import sine
 
 Float32Array = NDArray[np.float32]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 
-from fogml.locks import ARE_KNOWN, FileLock
+from fogml.folders import ARE_KNOWN, FileLock
 
 
 class WholeLines(JournalFileBackend):

@@ -19,9 +19,9 @@ from optuna.trial import FrozenTrial
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
 
 from fogml.errors import InputError
+from fogml.json_files import parse_json
 from fogml.processes import process_is_alive, process_start
 from fogml.runs.run import Run
-from fogml.strict_json import parse_json
 from fogml.tuning.plan import Plan
 from fogml.tuning.storage import import_optuna, open_storage, shown
 

@@ -131,7 +131,7 @@ def earth_field(
     vertical
         Part that points down in the northern hemisphere and up in the southern.
     """
-    from fogml.signals.waves import sine
+    from fogml.signals.bases import sine
 
     held = attitude(facts)
     field = np.array([horizontal, 0.0, -math.copysign(1.0, latitude_of(facts)) * vertical])

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.signals.waves import sine
+from fogml.signals.bases import sine
 from fogml.twin.attitude import earth_rate, turned
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA, DELTA_WINDOW_S

@@ -15,9 +15,9 @@ from fogml.errors import InputError, known_are
 from fogml.runs.columns import KNOWN, REPLAYED, coil_sensor_number, header, is_temperature
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import FloatArray, Run
-from fogml.twin.between_runs import Storage
 from fogml.twin.chain import ChainOutput
 from fogml.twin.programme import Programme, load_programme
+from fogml.twin.replay_after import Storage
 from fogml.twin.truth import TIME_ON, Truth, written_time_on
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin

@@ -13,14 +13,6 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.twin.attitude import attitude, earth_field
-from fogml.twin.between_runs import (
-    Storage,
-    later_s,
-    storage_drives,
-    storage_times,
-    stored_nodes,
-    windows_with_history,
-)
 from fogml.twin.chain import Branch, ChainOutput, hidden, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
@@ -28,6 +20,14 @@ from fogml.twin.noise import Streams
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.programme import Programme
 from fogml.twin.random_errors import RandomErrors
+from fogml.twin.replay_after import (
+    Storage,
+    later_s,
+    storage_drives,
+    storage_times,
+    stored_nodes,
+    windows_with_history,
+)
 from fogml.twin.timeline import Timeline, TimelineBlock
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import twin_dict

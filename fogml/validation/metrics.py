@@ -19,9 +19,14 @@ from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.signals.averages import BlockAverages, block_averages, freedom_of_deviation
 from fogml.signals.distributions import deviation_within
-from fogml.validation.rate_ladder import find_ladder, ladder_figures
 from fogml.validation.results import Metrics, Repeatability, RunJudgement, SoakBias, SpreadOverRuns
-from fogml.validation.scale_factor import LEAST_SHARE, find_steps, scale_factor_error
+from fogml.validation.scale_factor import (
+    LEAST_SHARE,
+    find_ladder,
+    find_steps,
+    ladder_figures,
+    scale_factor_error,
+)
 from fogml.validation.soaks import find_soaks, hysteresis, temperature_sensitivity
 
 SETTLED_SHARE = 0.25

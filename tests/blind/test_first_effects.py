@@ -18,8 +18,7 @@ from fogml.blind.first.reality import INVENTED, KNOWN, REALITY, WRONG_STRUCTURE,
 from fogml.blind.first.recurrences import bouc_wen, lag, play, recurrence
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Form, compatible
-from fogml.blind.frame.reckoning import Reckoning
-from fogml.blind.frame.strength import Acting, Scales, TooWeak, acting_before, recorded
+from fogml.blind.frame.strength import Acting, Reckoning, Scales, TooWeak, acting_before, recorded
 from fogml.blind.frame.unit import Unit
 from fogml.blind.make import recorded_run
 from fogml.blind.plan import Plan

@@ -17,13 +17,13 @@ from safetensors.numpy import load_file, save_file
 
 import fogml
 from fogml.errors import InputError
+from fogml.json_files import content_hash
 from fogml.models.compensation import compensate_blocks
 from fogml.models.feature_model import FeatureModel
 from fogml.models.linear import LinearRegressor
 from fogml.models.names import make_model
 from fogml.models.rbf import RBFRegressor
 from fogml.models.saved import load_model, model_to_saved, save_model
-from fogml.strict_json import content_hash
 from fogml.testing.models import synthetic_run
 
 

@@ -230,7 +230,7 @@ def test_the_lock_of_a_dead_process_is_taken_over(tmp_path, monkeypatch):
             assert json.loads(lock.read_text())["pid"] == os.getpid()
         assert not lock.exists()
     # On a file system without locks there is only what the file states.
-    monkeypatch.setattr("fogml.locks._locked", lambda handle, wait: False)
+    monkeypatch.setattr("fogml.folders._locked", lambda handle, wait: False)
     for text in ("", "garbage", json.dumps({**gone, "host": here})):
         lock.write_text(text)
         with sole_writer(out), pytest.raises(InputError, match=f"process {os.getpid()} on"), sole_writer(out):

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.real_files import long_logs
-from fogml.readers import spool as spools
-from fogml.readers.spool import Rows, Spool
+from fogml.readers import columns
+from fogml.readers.columns import Rows, Spool
 from fogml.runs import reader_process
 from fogml.runs.other_rate import Beside, interpolated
 from fogml.runs.reader_process import StoredArray
@@ -31,7 +31,7 @@ def test_rows_come_back(layout, sizes, seed, data):
     content = rng.bytes(sum(sizes) * layout.itemsize)
     whole = np.frombuffer(content, layout)
     with pytest.MonkeyPatch.context() as patch, closing(Spool()) as spool:
-        patch.setattr(spools, "BLOCK_BYTES", data.draw(st.integers(1, 200)))
+        patch.setattr(columns, "BLOCK_BYTES", data.draw(st.integers(1, 200)))
         rows, other, at = Rows(spool, layout), Rows(spool, "<i4"), 0
         for size in sizes:
             rows += content[at : at + size * layout.itemsize]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fogml.signals.waves import sine
+from fogml.signals.bases import sine
 
 
 @given(st.lists(st.floats(-1e6, 1e6), max_size=40))

@@ -10,12 +10,11 @@ import pytest
 from fogml.errors import InputError
 from fogml.gap.diagnosis import with_epoch
 from fogml.runs.facts import Facts
-from fogml.twin.between_runs import Storage, storage_times
 from fogml.twin.effect import NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.registry import effect, effects
 from fogml.twin.replay import replay
-from fogml.twin.replay_after import replay_after
+from fogml.twin.replay_after import Storage, replay_after, storage_times
 from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin

@@ -7,8 +7,7 @@ import pytest
 
 from fogml.runs.run import Run
 from fogml.validation.metrics import RunMetrics
-from fogml.validation.rate_ladder import find_ladder, ladder_figures
-from fogml.validation.scale_factor import find_steps
+from fogml.validation.scale_factor import find_ladder, find_steps, ladder_figures
 
 RATES = (5.0, 10.0, 20.0, 40.0)
 DEG_H = 3600.0

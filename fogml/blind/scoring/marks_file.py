@@ -23,8 +23,8 @@ from fogml.blind.folders import DIAGNOSIS
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.truth import KINDS, Truth
 from fogml.errors import InputError
+from fogml.json_files import MOST_BYTES, parse_json
 from fogml.outputs import whole_file
-from fogml.strict_json import MOST_BYTES, parse_json
 
 MARKS = "marks.json.gz"
 SCHEMA = "fogml.blind_marks/1"

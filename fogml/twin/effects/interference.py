@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.signals.waves import sine
+from fogml.signals.bases import sine
 from fogml.twin.effect import BiasEffect, WhiteNoiseEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import phase, shared, signed, unsigned
