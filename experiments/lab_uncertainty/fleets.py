@@ -12,8 +12,8 @@ from experiments.lab_uncertainty.measure import Told, coverage, of_errors, of_ru
 from experiments.lab_uncertainty.models import share_within
 from experiments.lab_uncertainty.signals import NAVIGATION, TACTICAL, Noise, lagged, thermometer
 from fogml.arrays import FloatArray
+from fogml.fleet import FORM
 from fogml.fleet.constants import FleetConstants, UnitConstants, fleet_constants
-from fogml.fleet.form import FORM
 from fogml.fleet.shared import shared_model
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run

@@ -24,17 +24,16 @@ import numpy as np
 
 from experiments.results import write_results
 from fogml import __version__
-from fogml.blind.first.effects.coil import WarmupStretched
+from fogml.blind.first.effects.coil import HysteresisPreisach, WarmupStretched
 from fogml.blind.first.effects.electrical import PolarisationChirped
-from fogml.blind.first.effects.memory import HysteresisPreisach
 from fogml.blind.first.reality import REALITY
 from fogml.blind.frame.form import Form
 from fogml.blind.frame.strength import Acting
 from fogml.blind.make import recorded_run
 from fogml.blind.plan import Plan
 from fogml.cli.fleet_job import fleet_and_write
+from fogml.cli.run_commands import FleetSettings
 from fogml.cli.terminal import Terminal
-from fogml.cli.unit_commands import FleetSettings
 from fogml.fleet.tasks import OUTCOME
 from fogml.gap.result import NAMED
 from fogml.runs.writing import write_run

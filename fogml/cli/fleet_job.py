@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from fogml.cli.fleet_unit import UnitWork
+from fogml.cli.run_commands import FleetSettings
 from fogml.cli.terminal import Terminal, Work, number
-from fogml.cli.unit_commands import FleetSettings
 from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest

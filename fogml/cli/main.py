@@ -59,11 +59,11 @@ COMMANDS = {
         "Procedures of a laboratory: misalignment, rate table, north seeking, acceptance.",
     ),
     "fleet": (
-        ".unit_commands:FleetSettings",
+        ".run_commands:FleetSettings",
         "Do the same job for every unit of a manifest, in parallel, here or on a cluster.",
     ),
     "monitor": (
-        ".unit_commands:MonitorSettings",
+        ".run_commands:MonitorSettings",
         "Watch units in service: what their model leaves on each run, and since when that is another.",
     ),
     "app": (

@@ -9,9 +9,9 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from fogml.cli.run_commands import MonitorSettings
 from fogml.cli.runs import check_named_once, open_blocks
 from fogml.cli.terminal import Terminal, number
-from fogml.cli.unit_commands import MonitorSettings
 from fogml.errors import InputError, counted
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.models.base import DriftModel

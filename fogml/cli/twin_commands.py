@@ -34,7 +34,7 @@ class ReplaySettings(Settings):
     Simulink's logged output, or the folder of results of gnss-ins-sim.
     """
 
-    job: ClassVar[str] = "fogml.cli.replay_job:replay_and_write"
+    job: ClassVar[str] = "fogml.cli.twin_jobs:replay_and_write"
     twin: Annotated[
         str | None,
         argument("TWIN", "A twin file or name, or a simulator's output.", reads=True, known=options.TWINS),
@@ -216,7 +216,7 @@ class SimulateSettings(Settings):
     Samples in which the unit is off are not recorded.
     """
 
-    job: ClassVar[str] = "fogml.cli.simulate_job:simulate_and_write"
+    job: ClassVar[str] = "fogml.cli.twin_jobs:simulate_and_write"
     config_argument: ClassVar[str] = "YAML file of schema fogml.simulate/1."
     schema_: Literal["fogml.simulate/1"] = Field("fogml.simulate/1", alias="schema")
     sample_s: Annotated[float, option("Sample interval.", "--sample", metavar="SECONDS")] = 1.0

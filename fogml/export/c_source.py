@@ -20,7 +20,7 @@ from fogml.export.c_float import float_context, input_units, literal, sensor_ide
 from fogml.export.layout import NOISE_TICKS, Layout, Number, layout
 from fogml.export.plan import Plan
 from fogml.export.self_test import SelfTest, make_self_test
-from fogml.features.windows import GAP_BINS, LOST, MOST_IN_BIN
+from fogml.features.operators import GAP_BINS, LOST, MOST_IN_BIN
 from fogml.runs.columns import is_temperature
 from fogml.signals.clock import LEAST_SHARE
 

@@ -13,9 +13,9 @@ from typing import Literal
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.features.atoms import RATE_UNIT_S, Atom
+from fogml.features.operators import Window, ring_of
 from fogml.features.own import Recursion
 from fogml.features.signal import Signal
-from fogml.features.windows import Window, ring_of
 from fogml.runs.columns import is_temperature
 from fogml.signals.clock import (
     LEAST_SHARE,

@@ -33,10 +33,10 @@ from math import prod
 from fogml.errors import quoted
 from fogml.features.atoms import Atom
 from fogml.features.operands import OperandReader
+from fogml.features.operators import DEFAULT_WINDOW, METHODS, Window
 from fogml.features.own import own_operator, own_window
 from fogml.features.signal import Signal
 from fogml.features.terms import Term
-from fogml.features.windows import DEFAULT_WINDOW, METHODS, Window
 from fogml.runs.columns import is_temperature
 
 HIGHEST_POWER = 20

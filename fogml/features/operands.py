@@ -11,9 +11,9 @@ from typing import NoReturn, cast
 
 from fogml.errors import InputError, quoted
 from fogml.features.atoms import HYSTERESIS_DEGC, Atom
+from fogml.features.operators import METHODS
 from fogml.features.own import Function, Recursion
 from fogml.features.signal import NOT_INPUTS, TIME_ON, Signal, known_temperatures
-from fogml.features.windows import METHODS
 
 MOST_CHARACTERS = 10_000
 """Longest feature text: what the toolkit writes itself has some hundreds of characters."""

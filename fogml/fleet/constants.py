@@ -17,14 +17,13 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
+from fogml.fleet import FORM
 from fogml.fleet.covariates import CovariateColumns, CovariateEffects, Covariates
-from fogml.fleet.form import FORM
-from fogml.fleet.spread import each_unit, least_squares, widening
+from fogml.fleet.shares import each_unit, least_squares, widening
 from fogml.intervals import SIGMA_PER_MEDIAN
 from fogml.models.box import learn_box
 from fogml.models.generalised_least_squares import runs_noise, shift_of_runs, shifted
-from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
-from fogml.models.mixed_effects_basis import SizePriors
+from fogml.models.mixed_effects import OWN_PARTS, SizePriors, fit_mixed_effects
 from fogml.models.mixed_effects_model import averages_of, composed
 from fogml.models.prior import Prior, rarity
 from fogml.models.table import run_rows

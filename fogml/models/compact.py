@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import Atom
+from fogml.features.operators import ring_of
 from fogml.features.terms import Step
-from fogml.features.windows import ring_of
 from fogml.models.regressors import goes_on_linearly
 
 if TYPE_CHECKING:

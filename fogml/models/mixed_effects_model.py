@@ -26,8 +26,7 @@ from fogml.models.combination import (
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.intervals import Intervals
 from fogml.models.linear import LinearRegressor
-from fogml.models.mixed_effects import fit_mixed_effects
-from fogml.models.mixed_effects_basis import SizePriors
+from fogml.models.mixed_effects import SizePriors, fit_mixed_effects
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
 from fogml.models.weights import intervals_of, weights_of
 from fogml.runs.run import Run

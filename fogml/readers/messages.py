@@ -19,8 +19,7 @@ from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from fogml.readers.columns import Column, Container, Rows
-from fogml.readers.message_fields import numbers, stamps_in, values_of
+from fogml.readers.columns import Column, Container, Rows, numbers, stamps_in, values_of
 
 _RECORD = struct.Struct("<BQ")
 """Kind of a record, and bytes that follow."""

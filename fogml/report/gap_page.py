@@ -37,13 +37,7 @@ class RunSection:
 
 
 def gap_page(found: Diagnosis) -> str:
-    """The self-contained HTML page of a diagnosis.
-
-    Returns
-    -------
-    str
-        The page, to be written as UTF-8.
-    """
+    """The self-contained HTML page of a diagnosis."""
     names = titles(found)
     where = found.where
     drawn = _drawn(found)

@@ -65,11 +65,6 @@ def train_page(
         The block of text for a firmware file, where the model has a compact form.
     navigation
         What the drift costs a navigator, as :func:`fogml.lab.navigation.navigation_costs` gives it.
-
-    Returns
-    -------
-    str
-        The page, to be written as UTF-8.
     """
     name = subject(judgement)
     return render(

@@ -92,10 +92,6 @@ def block_difference(
     out
         Where the values are put, shape (n,), contiguous; a new array if None.
 
-    Returns
-    -------
-    Windowed
-
     Raises
     ------
     InputError

@@ -13,10 +13,10 @@ from fogml.errors import InputError
 from fogml.features.atoms import Atom
 from fogml.features.features import Features
 from fogml.features.grammar import parse_terms
+from fogml.features.operators import METHODS, Window
 from fogml.features.parse import parse_features
 from fogml.features.signal import TIME_ON, Signal
 from fogml.features.terms import Term
-from fogml.features.windows import METHODS, Window
 from fogml.runs.run import Run
 
 SENSORS = ["T", "T_in", "T_out", "T_chamber", "T_case", "T_electronics", "T1", "T2", "T12"]

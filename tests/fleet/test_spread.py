@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fogml.fleet.constants import UnitConstants, fleet_constants
-from fogml.fleet.shares import discoveries
-from fogml.fleet.spread import widening
+from fogml.fleet.shares import discoveries, widening
 from fogml.fleet.summary import fleet_json
 
 

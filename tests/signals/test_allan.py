@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.signals.allan import allan_deviation
-from fogml.signals.allan_confidence import degrees_of_freedom, noise_exponents
+from fogml.signals.allan import allan_deviation, degrees_of_freedom, noise_exponents
 
 
 def flicker(rng: np.random.Generator, n: int) -> np.ndarray:

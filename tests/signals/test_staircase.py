@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fogml.signals.staircase import course_through_steps
+from fogml.signals.smoothing import course_through_steps
 
 ROUNDED = 1.0 / np.sqrt(12.0)
 """Rms of what rounding hides of a moving quantity, in steps."""

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from fogml.arrays import FloatArray, IntArray
-from fogml.blind.first.effects import coil, electrical, invented, memory, sensing, turning
+from fogml.blind.first.effects import coil, electrical, invented, sensing, turning
 from fogml.blind.first.noise import NoiseConstants, draw_instruments, draw_noise, draw_series, sense
 from fogml.blind.first.plant import (
     CASE,
@@ -233,7 +233,7 @@ def _shown(others: tuple[str, ...], demands: Demands, world: World) -> tuple[str
     return tuple(dict.fromkeys(names))
 
 
-KNOWN = forms_in(coil, memory, electrical, turning, sensing)
+KNOWN = forms_in(coil, electrical, turning, sensing)
 """Forms of effects that the catalogue holds; some effects have two.
 
 ``mount_tilt`` has none: with Earth rate alone on a table that turns, a tilt that a fixture has stays
@@ -241,7 +241,7 @@ far under the noise of every unit here.
 """
 INVENTED = forms_in(invented, sensing, turning, known=False)
 """Effects that no library holds."""
-WRONG_STRUCTURE = memory.DeepPlate
+WRONG_STRUCTURE = coil.DeepPlate
 """Another thermal order than any twin's."""
 
 

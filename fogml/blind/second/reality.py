@@ -18,7 +18,7 @@ from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.record import Course, SetUp, World
 from fogml.blind.frame.thermometers import draw_instruments, quick_enough, sense
 from fogml.blind.frame.unit import Reality, Unit, UnitRun
-from fogml.blind.second.effects import driven, lasting, sensing, turning, unknown, winding
+from fogml.blind.second.effects import driven, lasting, turning, unknown, winding
 from fogml.blind.second.plant import NAMES, Plant, draw_plant
 from fogml.blind.second.programme import Programme, draw_programme, static_programme
 
@@ -234,12 +234,12 @@ def _remembered(past: tuple[float, ...], world: World) -> tuple[float, ...]:
     return (*past, *turned, float(winding[-1]), 22.0)
 
 
-KNOWN = forms_in(winding, lasting, driven, turning, sensing)
+KNOWN = forms_in(winding, lasting, driven, turning)
 """Forms of effects that a gyro's physics knows by name; how near the catalogue's are is not asked.
 
 ``mount_tilt`` and ``coil_expansion`` have none: with Earth rate alone on a table that turns, and with sensors
 on the coil, no run of a unit here shows them.
 """
-INVENTED = forms_in(unknown, sensing, known=False)
+INVENTED = forms_in(unknown, turning, known=False)
 """Effects that no library holds."""
 REALITY = Reality("second", KNOWN, INVENTED, lasting.AnotherOrder, draw_unit)

@@ -6,7 +6,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step, to_steps
-from fogml.signals.staircase import course_through_steps
+from fogml.signals.smoothing import course_through_steps
 from fogml.twin.effect import SensorEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity, shared, signed, unsigned

@@ -1,0 +1,287 @@
+"""The jobs of ``fogml import``, ``inspect`` and ``noise``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from fogml.cli.results import tell
+from fogml.cli.run_commands import ImportSettings, InspectSettings, NoiseSettings
+from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs
+from fogml.cli.terminal import Terminal, number, span
+from fogml.errors import InputError
+from fogml.outputs import whole_file, whole_folder
+from fogml.report.words import duration
+from fogml.runs.columns import header
+from fogml.runs.findings import FIRST_OF_ALL
+from fogml.runs.noise_of_run import noise_report
+from fogml.runs.run import Run
+from fogml.validation.inspection import inspection_json
+from fogml.validation.limits import hold_strict
+
+_FIRST_ROWS = 5
+
+
+def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
+    """Import, write the runs into ``settings.out``, and say what was written."""
+    from fogml.runs.profiles import import_recording, profile_names
+    from fogml.runs.writing import check_side_file, write_run
+
+    if not settings.file:
+        raise InputError("no file is given; name the logger's file")
+    if settings.draft:
+        _draft(settings, terminal)
+        return
+    if not settings.profile:
+        raise InputError(
+            f"no --profile is given; those that ship are {', '.join(profile_names())}, and "
+            f"'fogml import {Path(settings.file).name} --draft -o profile.yaml' writes a first one"
+        )
+    if not settings.out:
+        raise InputError("no --out is given; name the folder for the runs")
+    written = []
+    with whole_folder(settings.out, shared=True) as folder:
+        with terminal.work(f"reading {settings.file}") as work:
+            runs = import_recording(
+                settings.file,
+                settings.profile,
+                settings.axis,
+                repair=bool(settings.repair),
+                most_dropped=most_dropped(settings.repair),
+            )
+            _check_apart(settings.file, settings.out, [run.name for run in runs])
+            for run in runs:
+                work.doing(f"writing {run.name}")
+                check_side_file(Path(settings.out) / f"{run.name}.csv", run.facts)
+                write_run(run, folder / f"{run.name}.csv")
+        for run in runs:
+            for finding in run.findings:
+                terminal.note(f"{run.name}: {finding.message}")
+            written.append(
+                {
+                    "run": f"{run.name}.csv",
+                    "rows": len(run),
+                    "span_s": run.span_s,
+                    "facts": run.facts.as_dict(),
+                    "findings": [finding.as_dict() for finding in run.findings],
+                }
+            )
+        settings.write_into(folder, "import")
+    rows = [[run.name, str(len(run)), span(run.span_s)] for run in runs]
+    terminal.table(f"Written to {settings.out}", ["run", "rows", "span"], rows)
+    terminal.result({"schema": "fogml.import/1", "runs": written})
+
+
+def _draft(settings: ImportSettings, terminal: Terminal) -> None:
+    """Write or print a profile with guesses, and show the first rows that it reads."""
+    from fogml.runs.profile_draft import draft_profile
+    from fogml.runs.profiles import import_recording
+
+    assert settings.file is not None
+    path = Path(settings.file)
+    text = draft_profile(path)
+    shown: list[dict[str, object]] = []
+    with TemporaryDirectory(prefix="fogml-draft-") as folder:
+        draft = Path(folder) / "profile.yaml"
+        draft.write_text(text, encoding="utf-8")
+        try:
+            runs = import_recording(path, draft)
+        except InputError as error:
+            runs = []
+            terminal.note(f"the draft does not read the file yet: {error}")
+    if settings.out:
+        with whole_file(settings.out) as file:
+            file.write_text(text, encoding="utf-8")
+        terminal.say(f"Written to {settings.out}; correct what it calls a guess, then")
+        terminal.say(f"fogml import {path.name} --profile {Path(settings.out).name} -o FOLDER")
+    else:
+        terminal.say(text.rstrip())
+    for run in runs:
+        first = run[:_FIRST_ROWS]
+        rows = [[f"{values[i]:.9g}" for values in first.columns.values()] for i in range(len(first))]
+        terminal.table(f"{run.name}: the first rows", [header(name) for name in run.columns], rows)
+        shown.append({"run": run.name, "rows": len(run), "span_s": run.span_s})
+    terminal.result({"schema": "fogml.import/1", "profile": text, "runs": shown})
+
+
+def _check_apart(file: str, out: str, names: Sequence[str]) -> None:
+    """Refuse to write a run, with its side file, over the recording that it comes from."""
+    recording = Path(file).resolve()
+    if Path(out).resolve() == recording.parent and recording.stem in names:
+        raise InputError(
+            f"--out {out} is the recording's own folder, and '{recording.stem}.csv' with its side file would "
+            "replace what is there; choose another --out"
+        )
+
+
+def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:
+    """Look into the runs, write what was found where an output folder is named, and print it."""
+    if not settings.runs:
+        raise InputError("no run is given; name at least one")
+    runs: list[Run] = []
+
+    def make() -> dict[str, Any]:
+        # Findings are part of the result here, so they are not noted on stderr as well.
+        runs.extend(
+            open_runs(settings.runs, Terminal(quiet=True), repair=settings.repair, axis=settings.axis)
+        )
+        if settings.strict:
+            hold_strict([(run.name, run.findings) for run in runs])
+        with terminal.work("looking into the runs"):
+            return inspection_json(runs)
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report.inspect_page import inspect_page
+
+        return inspect_page(runs, values)
+
+    tell("inspect", settings, terminal, make, page, _print_inspection)
+
+
+def _print_inspection(values: dict[str, Any], terminal: Terminal) -> None:
+    for run in values["runs"]:
+        _print_run(run, terminal)
+
+
+def _print_run(run: dict[str, Any], terminal: Terminal) -> None:
+    first = [finding for finding in run["findings"] if finding["code"] in FIRST_OF_ALL]
+    for finding in first:
+        terminal.say(f"{run['run']}: {finding['code'].replace('_', ' ')}: {finding['message']}")
+    rows = [
+        [column["name"], column["unit"] or "–", *(number(column[key]) for key in _STATISTICS)]
+        for column in run["columns"]
+    ]
+    title = f"{run['run']}: {run['rows']} rows, {duration(run['span_s'])}, one in {duration(run['sample_s'])}"
+    terminal.table(title, ["column", "unit", *(key.replace("_", " ") for key in _STATISTICS)], rows)
+    if run["earth_rate_deg_h"] is not None:
+        terminal.say(f"Earth rate along the input axis: {number(run['earth_rate_deg_h'])} deg/h")
+    else:
+        terminal.say("Earth rate along the input axis: not known (state latitude and input_axis)")
+    for name, found in run["temperatures"].items():
+        terminal.say(
+            f"{name}: span {number(found['span'])} degC, fastest rise {number(found['fastest_rise'])}, "
+            f"fastest fall {number(found['fastest_fall'])} degC/min"
+        )
+    gaps = run["gaps"]
+    if gaps["count"]:
+        terminal.say(
+            f"gaps: {gaps['count']}, the longest {duration(gaps['longest_s'])}, {gaps['stretches']} stretches"
+        )
+    spent = [
+        f"{name.replace('_', ' ')} {duration(time)}"
+        for name, time in run["regimes"]["seconds"].items()
+        if time
+    ]
+    terminal.say("regimes: " + ", ".join(spent))
+    for finding in run["findings"][len(first) :]:
+        terminal.say(f"{finding['code'].replace('_', ' ')}: {finding['message']}")
+
+
+_STATISTICS = ("least", "greatest", "mean", "standard_deviation")
+
+
+def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
+    """Tell the noise of a run, write it where an output folder is named, and print it."""
+    if not settings.run:
+        raise InputError("no run is given; name one")
+    if settings.to is not None:
+        from fogml.export.noise_parameters import check_target
+
+        check_target(settings.to)
+
+    def beside(values: dict[str, Any], folder: Path) -> None:
+        for name, text in _for_others(settings, values):
+            (folder / name).write_text(text, encoding="utf-8")
+
+    def show(values: dict[str, Any], terminal: Terminal) -> None:
+        _print_noise(values, terminal)
+        for name, text in _for_others(settings, values):
+            terminal.say(f"{name}:\n{text}")
+
+    make = partial(_noise, settings, terminal)
+    tell("noise", settings, terminal, make, "fogml.report.noise_page:noise_page", show, beside)
+
+
+def _for_others(settings: NoiseSettings, values: dict[str, Any]) -> list[tuple[str, str]]:
+    """File name and text for the program that is asked for, if any is."""
+    from fogml.export.noise_parameters import noise_text
+
+    return [] if settings.to is None else [noise_text(values, settings.to)]
+
+
+def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
+    paths = [settings.run] if isinstance(settings.run, str) else list(settings.run or ())
+    check_named_once(paths)
+    with terminal.work(f"reading {paths[0]}") as work:
+        runs = []
+        for path in paths:
+            work.doing(f"reading {path}")
+            runs.append(open_run(path, repair=settings.repair, axis=settings.axis))
+        work.doing("averaging")
+        values = noise_report(runs, overlapping=settings.overlapping)
+        if len(runs) == 1:
+            values["floor"] = _floor(runs[0], values["taus_s"])
+        return values
+
+
+def _floor(run: Run, taus_s: Sequence[float]) -> dict[str, Any] | None:
+    """The noise floor as drift models are held against, from their usual averaging time on."""
+    from fogml.signals.averages import AVERAGING_S
+    from fogml.validation.floors import floors_over
+
+    longest = 0.5 * run.span_s
+    times = [AVERAGING_S, *(tau for tau in taus_s if AVERAGING_S < tau <= longest)]
+    found = floors_over(run, AVERAGING_S, times)
+    if not found:
+        return None
+    return {
+        "averaging_s": times,
+        "value": [floor.value for floor in found],
+        "ci": [[floor.lower, floor.upper] for floor in found],
+        "unit": "deg/h",
+        "source": found[0].source,
+    }
+
+
+def _print_noise(values: dict[str, Any], terminal: Terminal) -> None:
+    kind = "overlapping" if values["overlapping"] else "not overlapping"
+    rows = [
+        [f"{tau:.6g}", number(adev), number(low), number(high)]
+        for tau, adev, (low, high) in zip(values["taus_s"], values["adev"], values["ci"], strict=True)
+    ]
+    level = f"{values['level']:.0%}"
+    terminal.table(
+        f"{values['run']}: Allan deviation, {kind}",
+        ["tau [s]", "deviation [deg/h]", f"{level} from", "to"],
+        rows,
+    )
+    rows = [
+        [name, number(term["value"]), number(term["ci"][0]), number(term["ci"][1]), term["unit"]]
+        for name, term in values["terms"].items()
+    ]
+    terminal.table("IEEE 952 terms", ["term", "value", f"{level} from", "to", "unit"], rows)
+    if len(values["runs"]) > 1:
+        rows = [
+            [
+                one["run"],
+                *(number(one["terms"]["N"][key]) for key in ("value",)),
+                *map(number, one["terms"]["N"]["ci"]),
+            ]
+            for one in values["runs"]
+        ]
+        terminal.table("N of each run alone [deg/sqrt(h)]", ["run", "N", f"{level} from", "to"], rows)
+    floor = values.get("floor")
+    if floor:
+        low, high = floor["ci"][0]
+        over = duration(floor["averaging_s"][0])
+        terminal.say(
+            f"noise floor of averages over {over}: {number(floor['value'][0])} deg/h "
+            f"({level} from {number(low)} to {number(high)}), from {floor['source']}"
+        )
+    minimum = values["minimum"]
+    terminal.say(f"minimum: {number(minimum['adev'])} deg/h at {duration(minimum['tau_s'])}")
+    for text in (*values["notes"], *(finding["message"] for finding in values["findings"])):
+        terminal.say(text)
