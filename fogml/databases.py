@@ -22,11 +22,6 @@ def parse_url(url: str, given_as: str = "--storage") -> URL:
         ``postgresql://user@host/database`` or another URL that SQLAlchemy knows.
     given_as
         The option that it was given by, for the message.
-
-    Raises
-    ------
-    InputError
-        If it is none, or SQLAlchemy is not installed.
     """
     try:
         from sqlalchemy.engine import make_url

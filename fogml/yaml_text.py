@@ -45,11 +45,6 @@ def read_yaml(path: Path, as_text: Collection[str] = ()) -> Any:
         The file, UTF-8.
     as_text
         Keys whose values are names: a serial number 0417 stays the text that was written.
-
-    Raises
-    ------
-    InputError
-        Naming file, line and column.
     """
     try:
         with path.open("rb") as file:
@@ -79,11 +74,6 @@ def parse_yaml(text: str, source: str, as_text: Collection[str] = ()) -> Any:
     -------
     object
         Nothing but dict, list, str, bool, int, finite float and None.
-
-    Raises
-    ------
-    InputError
-        Naming source, line and column.
     """
     if len(text) > MOST_BYTES:
         raise InputError(f"{source}: longer than {MOST_BYTES >> 20} MB; that is no text of settings")

@@ -114,11 +114,6 @@ class Signal:
             The run.
         out
             Where it is put otherwise, shape (n,); a new array if None.
-
-        Raises
-        ------
-        InputError
-            If the run lacks a column.
         """
         (name, coefficient), *others = self.parts
         total = input_of(run, name)

@@ -245,11 +245,6 @@ def shared_model(
         The fleet's constants, or ``shared`` of a ``fleet.json``.
     covariates
         What is known of the unit's production; then it is drawn to units like it in that.
-
-    Raises
-    ------
-    InputError
-        If the values are no fleet's constants.
     """
     if isinstance(fleet, FleetConstants):
         prior = fleet.effects.prior(covariates or {}).as_dict()

@@ -47,11 +47,6 @@ def read_measurements(path: str | Path, state_angles_deg: Sequence[float] | None
     state_angles_deg
         Turn of states 1 to 4 in the mounting plane, clockwise as seen from +z [deg], where the file has no
         column of it; if None, that of the source document.
-
-    Raises
-    ------
-    InputError
-        Naming file, column and row, if something is missing or is not what it should be.
     """
     path = Path(path)
     table = read_table(path)

@@ -121,11 +121,6 @@ def misalignment_json(measured: TableMeasurements, cross_tilt: bool | None = Non
         What the turns gave.
     cross_tilt
         Whether to fit a constant over the tilts; if None, where the data show one.
-
-    Raises
-    ------
-    InputError
-        As :func:`fogml.lab.misalignment.decouple`.
     """
     found = decouple(measured, cross_tilt)
     per_rate = f"{measured.unit} per deg/s"

@@ -162,11 +162,6 @@ def check_order(
         Of the states' disagreement under the stated order; None where no noise is known.
     notes
         What to mind.
-
-    Raises
-    ------
-    InputError
-        If the stated order does not fit, and another order of the same turns does.
     """
     common = np.ones((len(STATES), 1))
     redundant = 2 * len(STATES) - 4

@@ -122,11 +122,6 @@ def drift_series(
     -------
     NavigationError
         Of shape (n + 1,), from rest at time 0.
-
-    Raises
-    ------
-    InputError
-        As `error_matrices`, or if the series is empty or not finite.
     """
     drift = np.asarray(drift_deg_h, dtype=np.float64)
     if drift.ndim != 1 or len(drift) == 0 or not np.all(np.isfinite(drift)):

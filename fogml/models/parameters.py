@@ -69,12 +69,6 @@ def check_parameters(kind: type, given: Mapping[str, Any], name: str | None = No
         The parameters that are stated.
     name
         What to call it in messages; the class's name if None.
-
-    Raises
-    ------
-    InputError
-        If there is no such parameter, or its value is not allowed; names parameter, value and what is
-        allowed.
     """
     name = name or kind.__name__
     stated = inspect.signature(kind).parameters

@@ -104,11 +104,6 @@ def schedule(
         that is said of the power is that it goes on.
     name
         For messages.
-
-    Raises
-    ------
-    InputError
-        Naming the step that can't be done, and why.
     """
     set_point, table = Track(), Table(table_acceleration)
     moments: dict[Switched, list[tuple[float, Setting, str]]] = {what: [] for what in SWITCHED}

@@ -21,14 +21,13 @@ def _winding_weights(shells: int, cubic: float) -> FloatArray:
 
 
 class WarmupStretched(Additive):
-    """A stretched exponential of the time since power-on."""
+    """A stretched exponential of the time since power-on: exp(-(t / tau)**beta)."""
 
     name, form, demands = "warmup_bias", "stretched exponential", Demands(power_on=True)
     ranges = {"time_constant": (300.0, 1500.0), "exponent": (0.6, 0.9)}
     evenly = ("time_constant",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """exp(-(t / tau)**beta)."""
         t = np.maximum(world.time_on, 0.0)
         return np.exp(-((t / shape["time_constant"]) ** shape["exponent"]))
 
@@ -188,7 +187,7 @@ class HysteresisPreisach(Additive):
 
 
 class ScaleFactorPreisach(ScaleFactor):
-    """Preisach's hysteresis of the scale factor."""
+    """Preisach's hysteresis of the scale factor: minus the mean of the plays' departures."""
 
     name, form = "sf_hysteresis", "Preisach"
     ranges = {"half_width": (3.0, 20.0), "spread": (0.2, 0.5)}
@@ -196,18 +195,16 @@ class ScaleFactorPreisach(ScaleFactor):
     evenly = ("half_width",)
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """Minus the mean of the plays' departures."""
         return -_prandtl_ishlinskii(world.nodes["T_coil"], shape["half_width"], shape["spread"])
 
 
 class StressSpectrum(Additive):
-    """A log-normal spectrum of Maxwell elements with an activation energy."""
+    """A log-normal spectrum of Maxwell elements with an activation energy: T less the weighted lags of T."""
 
     name, form = "stress_relaxation", "spectrum of Maxwell elements"
     ranges = {"time_constant": (900.0, 20000.0), "spread": (0.4, 1.0), "activation_kj": (42.0, 62.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """T less the weighted lags of T."""
         temperature = world.nodes["T_coil"]
         inverse = 1.0 / (temperature + 273.15) - 1.0 / 298.15
         slower = np.exp(1e3 * shape["activation_kj"] / _GAS_CONSTANT * inverse)
@@ -219,14 +216,13 @@ class StressSpectrum(Additive):
 
 
 class HiddenPlate(Additive):
-    """The table's plate, of two layers, that no sensor shows."""
+    """The table's plate, of two layers, that no sensor shows: plate less coil."""
 
     name, stage, form = "hidden_thermal_node", "thermal", "plate of two layers"
     records = ("T_chamber",)
     ranges = {"deep_share": (0.0, 0.3)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Plate less coil."""
         share = shape["deep_share"]
         plate = (1.0 - share) * world.nodes["T_plate"] + share * world.nodes["T_plate_deep"]
         return np.asarray(plate - world.nodes["T_coil"])
@@ -272,14 +268,13 @@ class MoistureFick(Additive):
 
 
 class AgeingPower(Additive):
-    """Ageing by a power of time."""
+    """Ageing by a power of time: ((1 + t / tau)**a - 1) / a."""
 
     name, form = "ageing", "power law"
     ranges = {"time_constant": (3600.0, 50e3), "exponent": (-0.3, 0.3)}
     """Time constant and exponent; exponent 0 is the logarithm."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """((1 + t / tau)**a - 1) / a."""
         a = shape["exponent"]
         log = np.log1p(world.time / shape["time_constant"])
         return np.expm1(a * log) / a if abs(a) > 1e-9 else log

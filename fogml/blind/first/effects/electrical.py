@@ -25,13 +25,12 @@ class PolarisationChirped(Additive):
 
 
 class BiasCurve(Additive):
-    """Static bias of third to sixth order."""
+    """Static bias of third to sixth order: v**3 + r4 v**4 + r5 v**5 + r6 v**6 with v = u / 50."""
 
     name, form, unit = "bias_polynomial", "orders three to six", "deg/h"
     ranges = {"quartic_ratio": (-1.0, 1.0), "quintic_ratio": (-1.0, 1.0), "sixth_ratio": (-0.1, 0.1)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """v**3 + r4 v**4 + r5 v**5 + r6 v**6 with v = u / 50."""
         v = (world.nodes["T_in"] - 25.0) / 50.0
         higher = shape["quartic_ratio"] + v * (shape["quintic_ratio"] + v * shape["sixth_ratio"])
         return np.asarray(v**3 * (1.0 + v * higher))
@@ -71,7 +70,7 @@ class FieldBent(Additive):
 
 
 class SupplyTriangle(Additive):
-    """Supply voltage and a ripple of triangular form."""
+    """Supply voltage and a ripple of triangular form: V - V_0 + a triangle(t)."""
 
     name, form, unit = "supply_ripple", "triangular ripple", "deg/h/V"
     records = ("supply",)
@@ -81,7 +80,6 @@ class SupplyTriangle(Additive):
     evenly = ("ripple",)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """V - V_0 + a triangle(t)."""
         turn = shape["alias_frequency"] * world.time + shape["phase"] / 360.0
         wave = 2.0 * np.arcsin(np.sin(2.0 * np.pi * turn)) / np.pi
         supply = world.drives["supply"]
@@ -104,7 +102,7 @@ class Crosstalk(Additive):
 
 
 class TurnOn(Additive):
-    """Another bias after each power-on, from Student's distribution."""
+    """Another bias after each power-on, from Student's distribution: a constant of this run."""
 
     name, form, several_runs = "turn_on_bias", "Student's distribution", True
     drawn_per_run = True
@@ -112,29 +110,26 @@ class TurnOn(Additive):
     ranges = {"freedom": (4.0, 10.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """A constant of this run."""
         return np.full(len(world.time), rng.standard_t(shape["freedom"]))
 
 
 class Rectification(Additive):
-    """Vibration rectified by a power near two."""
+    """Vibration rectified by a power near two: (g / 0.1)**p * 0.01, which is g**2 at 0.1 g."""
 
     name, form, unit, records = "vibration_rectification", "power near two", "deg/h/g2", ("vibration",)
     largest = 5.0
     ranges = {"exponent": (1.8, 2.2)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """(g / 0.1)**p * 0.01, which is g**2 at 0.1 g."""
         return 0.01 * (world.drives["vibration"] / 0.1) ** shape["exponent"]
 
 
 class DriftBent(Additive):
-    """A steady drift."""
+    """A steady drift: hours since the first sample."""
 
     name, stage, form, unit = "rate_ramp", "noise", "line", "deg/h/h"
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Hours since the first sample."""
         return world.time / 3600.0
 
 

@@ -30,20 +30,19 @@ class LagOfTwoStages(Sensing):
 
 
 class CoarseSteps(Sensing):
-    """A converter with whole steps that it cuts off rather than rounds."""
+    """A converter with whole steps that it cuts off rather than rounds: whole steps, in the mean unbiased."""
 
     name, form, unit = "sensor_quantisation", "truncation", "degC"
     greatest: ClassVar[float] = 2.0
     ranges = {"offset": (0.0, 1.0)}
 
     def read(self, values: FloatArray, amplitude: float, shape: Shape) -> FloatArray:
-        """Whole steps, in the mean unbiased."""
         steps = np.floor(values / amplitude + shape["offset"])
         return np.round(amplitude * (steps + 0.5 - shape["offset"]), 7)
 
 
 class Elsewhere(Sensing):
-    """Sensors that feel the case as well, the outer ones more."""
+    """Sensors that feel the case as well, the outer ones more: a mix of the place and the case."""
 
     name, form, unit, fine_sensors = "sensor_placement", "outer sensors more", "1", True
     records = ("T_case",)
@@ -53,7 +52,6 @@ class Elsewhere(Sensing):
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        """A mix of the place and the case."""
         outer = name in ("T_out", "T2", "T4")
         share = amplitude * (shape["outer"] if outer else 1.0)
         return temperature + share * (world.nodes["T_case"] - temperature)

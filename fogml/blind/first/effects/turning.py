@@ -13,7 +13,7 @@ from fogml.blind.frame.record import EARTH_DEG_H, World
 
 
 class SourceBent(ScaleFactor):
-    """Wavelength of the source, a little curved over its temperature."""
+    """Wavelength of the source, a little curved over its temperature: -u (1 + bend u)."""
 
     name, form, unit, records = "source_wavelength", "curved", "ppm/degC", ("T_electronics",)
     demands = Demands(turns=True, power_steps=True)
@@ -21,7 +21,6 @@ class SourceBent(ScaleFactor):
     """Curvature [1/degC]."""
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """-u (1 + bend u)."""
         u = world.nodes["T_electronics"] - 25.0
         return -u * (1.0 + shape["bend"] * u)
 
@@ -43,13 +42,12 @@ class ModulatorLoop(ScaleFactor):
 
 
 class PowerLaw(ScaleFactor):
-    """Scale factor that grows with a power of the rate."""
+    """Scale factor that grows with a power of the rate: (|Omega| / 100 deg/s)**p."""
 
     name, form = "sf_nonlinearity", "power law"
     ranges = {"exponent": (1.0, 2.0)}
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """(|Omega| / 100 deg/s)**p."""
         return (np.abs(world.rate_deg_h) / 360000.0) ** shape["exponent"]
 
 

@@ -12,7 +12,7 @@ from fogml.blind.second.memory import preisach
 
 
 class PolarisationBeats(Additive):
-    """One or two beats over the optics' temperature, which nobody records."""
+    """One or two beats over the optics' temperature, which nobody records: sum of the sines."""
 
     name, form = "polarization_nonreciprocity", "one or two periods on the optics"
 
@@ -25,7 +25,6 @@ class PolarisationBeats(Additive):
         return {"period": first, "second_period": second, "share": share, "a": phases[0], "b": phases[1]}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Sum of the sines."""
         turn = 2.0 * np.pi * (world.nodes["T_optics"] - 25.0)
         first = np.sin(turn / shape["period"] + shape["a"])
         return first + shape["share"] * np.sin(turn / shape["second_period"] + shape["b"])
@@ -45,7 +44,7 @@ class PolarisationFading(Additive):
 
 
 class SmoothBias(Additive):
-    """A static bias that is any smooth function of temperature."""
+    """A static bias that is any smooth function of temperature: sum of the waves."""
 
     name, form = "bias_polynomial", "random smooth function"
 
@@ -59,7 +58,6 @@ class SmoothBias(Additive):
         return found
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Sum of the waves."""
         u = world.nodes["T_coil"] - 15.0
         return sum(
             (np.cos(shape[f"wave_{k}"] * u + shape[f"phase_{k}"]) for k in range(12)), np.zeros_like(u)
@@ -150,37 +148,34 @@ class CrosstalkOfBoard(Additive):
 
 
 class RattleThreshold(Additive):
-    """Something that rattles above a level of vibration."""
+    """Something that rattles above a level of vibration: (g - g_0)**p of what exceeds it, scaled at 0.1 g."""
 
     name, form, records = "vibration_rectification", "above a threshold", ("vibration",)
     largest = 20.0
     ranges = {"threshold": (0.0, 0.03), "exponent": (1.3, 2.5)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """(g - g_0)**p of what exceeds it, scaled at 0.1 g."""
         above = np.maximum(world.drives["vibration"] - shape["threshold"], 0.0)
         return 0.01 * (above / 0.1) ** shape["exponent"]
 
 
 class DriftThatTires(Additive):
-    """A drift that slows down over the run."""
+    """A drift that slows down over the run: tau (1 - exp(-t / tau)) in hours."""
 
     name, stage, form = "rate_ramp", "noise", "saturating line"
     ranges = {"tires": (25000.0, 200000.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """tau (1 - exp(-t / tau)) in hours."""
         tau = shape["tires"] / 3600.0
         return -tau * np.expm1(-world.time / shape["tires"])
 
 
 class LineWithOvertone(Additive):
-    """A line in time with an overtone."""
+    """A line in time with an overtone: sin and a share of sin of twice."""
 
     name, stage, form = "sinusoidal", "noise", "line with an overtone"
     ranges = {"period": (200.0, 950.0), "phase": (0.0, 6.28), "second": (0.0, 0.5)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """sin and a share of sin of twice."""
         turn = 2.0 * np.pi * world.time / shape["period"] + shape["phase"]
         return np.sin(turn) + shape["second"] * np.sin(2.0 * turn)

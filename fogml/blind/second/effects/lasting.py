@@ -43,7 +43,7 @@ def _grains(winding: FloatArray, shape: Shape, past: tuple[float, ...]) -> Float
 
 
 class LoopOfGrains(Additive):
-    """Preisach's hysteresis whose density depends on the centre, in grains."""
+    """Preisach's hysteresis whose density depends on the centre, in grains: the relays' weighted sum."""
 
     name, form = "thermal_hysteresis", "Preisach in grains"
 
@@ -52,7 +52,6 @@ class LoopOfGrains(Additive):
         return _clusters(rng)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """The relays' weighted sum."""
         return _grains(world.nodes["T_coil"], shape, world.past)
 
 
@@ -86,7 +85,7 @@ class LoopOfBoucWen(Additive):
 
 
 class ScaleLoopOfGrains(ScaleFactor):
-    """Preisach's hysteresis of the scale factor, in grains."""
+    """Preisach's hysteresis of the scale factor, in grains: the relays' weighted sum."""
 
     name, form = "sf_hysteresis", "Preisach in grains"
 
@@ -95,18 +94,16 @@ class ScaleLoopOfGrains(ScaleFactor):
         return _clusters(rng)
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """The relays' weighted sum."""
         return _grains(world.nodes["T_coil"], shape, world.past)
 
 
 class ScaleLoopOfSlips(ScaleFactor):
-    """Slipping springs in the scale factor."""
+    """Slipping springs in the scale factor: force of springs whose reaches are evenly spread."""
 
     name, form = "sf_hysteresis", "Maxwell slip"
     ranges = {"reach": (4.0, 25.0)}
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """Force of springs whose reaches are evenly spread."""
         reaches = shape["reach"] * np.linspace(0.2, 1.8, 8)
         return -maxwell_slip(world.nodes["T_coil"], np.full(8, 0.125), lambda _: reaches, world.past)
 
@@ -129,13 +126,12 @@ class StressStretched(Additive):
 
 
 class StressPower(Additive):
-    """Strain that fades as a power of time."""
+    """Strain that fades as a power of time: (1 + t / tau)**-p over each change of temperature."""
 
     name, form = "stress_relaxation", "power law"
     ranges = {"time_constant": (200.0, 4000.0), "exponent": (0.3, 1.2), "per_ten": (0.2, 0.8)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """(1 + t / tau)**-p over each change of temperature."""
         tau, power, winding = shape["time_constant"], shape["exponent"], world.nodes["T_coil"]
         quick = _hastened(winding, shape["per_ten"])
         return faded(world.time, winding, lambda t: (1.0 + t / tau) ** -power, quick)
@@ -155,13 +151,12 @@ class HiddenBase(Additive):
 
 
 class HiddenSlab(Additive):
-    """The far side of a thick slab in the chamber's air."""
+    """The far side of a thick slab in the chamber's air: far face less winding."""
 
     name, stage, form, records = "hidden_thermal_node", "thermal", "a slab", ("T_chamber",)
     ranges = {"time_constant": (3000.0, 12000.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Far face less winding."""
         far = slab_lag(world.time, world.nodes["T_chamber"], shape["time_constant"])
         return far - world.nodes["T_coil"]
 
@@ -198,24 +193,22 @@ class WaterOfTwoStages(Additive):
 
 
 class AgeingOfDays(Additive):
-    """Ageing by the logarithm of the time since the first run, days between included."""
+    """Ageing by the logarithm of the time since the first run, days between included: log(1 + t / tau)."""
 
     name, form, several_runs = "ageing", "logarithm of days", False
     ranges = {"time_constant": (1800.0, 200000.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """log(1 + t / tau)."""
         return np.log1p((world.since_first + world.time) / shape["time_constant"])
 
 
 class AgeingOfHeat(Additive):
-    """Ageing by a power of time spent, where heat counts for more."""
+    """Ageing by a power of time spent, where heat counts for more: (t_0 + own time)**p, scaled to hours."""
 
     name, form = "ageing", "power of hot time"
     ranges = {"exponent": (0.3, 0.8), "per_ten": (0.1, 0.5), "before": (1000.0, 20000.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """(t_0 + own time)**p, scaled to hours."""
         spent = np.cumsum(_hastened(world.nodes["T_coil"], shape["per_ten"])) * world.sample_s
         return ((shape["before"] + world.since_first + spent) / 3600.0) ** shape["exponent"]
 

@@ -14,14 +14,13 @@ from fogml.blind.second.memory import backlash, slab_lag
 
 
 class SourceOwnHeat(ScaleFactor):
-    """Wavelength of a source that follows its own chip, not the board."""
+    """Wavelength of a source that follows its own chip, not the board: -u (1 + bend u) of the source."""
 
     name, form, records = "source_wavelength", "the chip's temperature", ("T_electronics",)
     demands = Demands(turns=True, power_steps=True)
     ranges = {"bend": (-3e-3, 3e-3)}
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """-u (1 + bend u) of the source."""
         u = world.nodes["T_source"] - 25.0
         return -u * (1.0 + shape["bend"] * u)
 
@@ -53,24 +52,22 @@ class SineResidual(ScaleFactor):
 
 
 class CubicRoot(ScaleFactor):
-    """A rest that grows with the root of the rate."""
+    """A rest that grows with the root of the rate: (|Omega| / 100 deg/s)**p."""
 
     name, form = "sf_nonlinearity", "root of the rate"
     ranges = {"exponent": (0.3, 0.8)}
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """(|Omega| / 100 deg/s)**p."""
         return (np.abs(world.rate_deg_h) / 360000.0) ** shape["exponent"]
 
 
 class AsymmetryWithRate(ScaleFactor):
-    """The two directions differ, at high rates by less."""
+    """The two directions differ, at high rates by less: sgn(rate) / (1 + |rate| / fades)."""
 
     name, form = "sf_asymmetry", "fading with the rate"
     ranges = {"fades": (30.0, 300.0)}
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """sgn(rate) / (1 + |rate| / fades)."""
         rate = world.rate_deg_h / 3600.0
         return np.tanh(rate / 1e-4) / (1.0 + np.abs(rate) / shape["fades"])
 
@@ -153,7 +150,7 @@ class LagThroughGlue(Sensing):
 
 
 class LagOneFace(Sensing):
-    """Only the inner face's thermometers have come loose."""
+    """Only the inner face's thermometers have come loose: one lag."""
 
     name, form, fine_sensors = "sensor_lag", "inner face alone", True
     greatest: ClassVar[float] = 2000.0
@@ -161,7 +158,6 @@ class LagOneFace(Sensing):
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        """One lag."""
         return temperature if name in _OUTER else late(temperature, amplitude, world.sample_s)
 
 
@@ -215,7 +211,7 @@ class WarmedByTheBoard(Sensing):
 
 
 class SlippingSensor(Sensing):
-    """An inner thermometer that sticks to its place and slips after it."""
+    """An inner thermometer that sticks to its place and slips after it: dragged along with a play."""
 
     name, known, form, fine_sensors = "slipping_sensor", False, "stick and slip", True
     greatest: ClassVar[float] = 40.0
@@ -223,7 +219,6 @@ class SlippingSensor(Sensing):
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        """Dragged along with a play."""
         return temperature if name in _OUTER else backlash(temperature, amplitude)
 
 

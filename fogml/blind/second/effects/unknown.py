@@ -13,7 +13,7 @@ from fogml.blind.second.memory import backlash, preisach
 
 
 class ThresholdSteps(Additive):
-    """Contacts that open at some temperatures and close at others."""
+    """Contacts that open at some temperatures and close at others: sum of the relays."""
 
     name, known, form = "threshold_steps", False, "few relays of unlike steps"
 
@@ -26,32 +26,29 @@ class ThresholdSteps(Additive):
         return found
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Sum of the relays."""
         keys = range(int(shape["contacts"]))
         at, gap, step = (np.array([shape[f"{name}_{k}"] for k in keys]) for name in ("at", "gap", "step"))
         return preisach(world.nodes["T_can"], at, gap, step, world.past)
 
 
 class RandomSteps(Additive):
-    """Steps at random times that stay."""
+    """Steps at random times that stay: a compound Poisson process."""
 
     name, known, stage, form = "random_steps", False, "noise", "steps in time"
     ranges = {"every": (2500.0, 12000.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """A compound Poisson process."""
         met = rng.random(len(world.time)) < world.sample_s / shape["every"]
         return np.cumsum(met * rng.standard_normal(len(world.time)))
 
 
 class SmoothWandering(Additive):
-    """A bias that wanders smoothly, each run its own way."""
+    """A bias that wanders smoothly, each run its own way: white noise smoothed over a length."""
 
     name, known, stage, form = "smooth_wandering", False, "noise", "smooth in time"
     ranges = {"length": (500.0, 4000.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """White noise smoothed over a length."""
         width = shape["length"] / world.sample_s
         smooth = gaussian_filter1d(rng.standard_normal(len(world.time)), width, mode="wrap")
         return smooth * np.sqrt(2.0 * np.sqrt(np.pi) * width)
@@ -110,13 +107,12 @@ class ConvectionCell(Additive):
 
 
 class BreathingLine(Additive):
-    """A line in time whose strength breathes."""
+    """A line in time whose strength breathes: sin times a slower sin."""
 
     name, known, stage, form = "breathing_line", False, "readout", "line with a beat"
     ranges = {"period": (1200.0, 4000.0), "beat": (6000.0, 20000.0), "a": (0.0, 6.28), "b": (0.0, 6.28)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """sin times a slower sin."""
         turn = 2.0 * np.pi * world.time
         slow = np.sin(turn / shape["beat"] + shape["b"])
         return np.asarray(slow * np.sin(turn / shape["period"] + shape["a"]))
@@ -135,13 +131,12 @@ class Condensation(Additive):
 
 
 class HeatedTelegraph(Additive):
-    """A contact that flickers, more often the hotter it is."""
+    """A contact that flickers, more often the hotter it is: -1 or 1."""
 
     name, known, stage, form = "heated_telegraph", False, "loop", "telegraph, faster in heat"
     ranges = {"dwell": (1500.0, 6000.0), "per_ten": (-0.4, 0.5)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """-1 or 1."""
         quick = np.exp(shape["per_ten"] * (world.nodes["T_board"] - 25.0) / 10.0)
         met = rng.random(len(world.time)) < np.minimum(world.sample_s * quick / shape["dwell"], 0.5)
         return np.asarray(1.0 - 2.0 * ((np.cumsum(met) + int(rng.random() < 0.5)) % 2))
@@ -201,13 +196,12 @@ class WoundCable(Additive):
 
 
 class RateFatigue(Additive):
-    """After each fast turn the bias comes back slowly."""
+    """After each fast turn the bias comes back slowly: lagged size of the rate, where the table rests."""
 
     name, known, stage, form = "rate_fatigue", False, "loop", "recovery after turns"
     demands = Demands(turns=True)
     ranges = {"recovers": (200.0, 2500.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Lagged size of the rate, where the table rests."""
         tired = late(np.sqrt(np.abs(world.table_rate)), shape["recovers"], world.sample_s)
         return np.where(world.table_rate == 0.0, tired, 0.0)

@@ -42,7 +42,7 @@ class PolarisationCreeping(Additive):
 
 
 class BiasOfSpline(Additive):
-    """A static bias through random values a few degrees apart."""
+    """A static bias through random values a few degrees apart: the spline at the inner annulus."""
 
     name, form = "bias_polynomial", "spline through random values"
 
@@ -52,32 +52,29 @@ class BiasOfSpline(Additive):
         return found | {f"value_{k}": float(rng.standard_normal()) for k in range(10)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """The spline at the inner annulus."""
         at = -70.0 + shape["apart"] * np.arange(10)
         curve = CubicSpline(at, [shape[f"value_{k}"] for k in range(10)])
         return np.asarray(curve(world.nodes["T_inner"]))
 
 
 class BiasResonant(Additive):
-    """A static bias with one broad dispersion."""
+    """A static bias with one broad dispersion: x / (1 + x**2)."""
 
     name, form = "bias_polynomial", "broad dispersion"
     ranges = {"at": (-20.0, 50.0), "width": (12.0, 35.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """x / (1 + x**2)."""
         x = (world.nodes["T_coil"] - shape["at"]) / shape["width"]
         return x / (1.0 + x * x)
 
 
 class ValvePickup(Additive):
-    """Each pulse of the valve moves the bias, behind a filter in the gyro."""
+    """Each pulse of the valve moves the bias, behind a filter in the gyro: filtered valve."""
 
     name, form = "chamber_pickup", "a valve's pulses"
     ranges = {"filter": (5.0, 120.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Filtered valve."""
         return late(world.drives["compressor"], shape["filter"], world.sample_s)
 
 
@@ -165,7 +162,7 @@ class StepsThatStick(Sensing):
 
 
 class FeelsTheMount(Sensing):
-    """Inner thermometers feel the hub, outer ones the cover."""
+    """Inner thermometers feel the hub, outer ones the cover: a mix of the place with its neighbour."""
 
     name, form, fine_sensors, records = "sensor_placement", "hub and cover", True, ("T_case",)
     greatest: ClassVar[float] = 1.0
@@ -174,7 +171,6 @@ class FeelsTheMount(Sensing):
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        """A mix of the place with its neighbour."""
         share = amplitude * (1.0 if name in _OUTER else shape["inner"])
         beside = world.nodes["T_cover" if name in _OUTER else "T_hub"]
         return temperature + share * (beside - temperature)

@@ -43,13 +43,12 @@ class Avalanches(Additive):
 
 
 class Pulses(Additive):
-    """Pulses at random times that die away."""
+    """Pulses at random times that die away: shot noise."""
 
     name, known, stage, form = "decaying_pulses", False, "readout", "pulses in time"
     ranges = {"every": (2500.0, 9000.0), "decay": (300.0, 2500.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Shot noise."""
         met = rng.random(len(world.time)) < world.sample_s / shape["every"]
         sizes = met * rng.standard_normal(len(world.time))
         return late(sizes, shape["decay"], world.sample_s) * shape["decay"] / world.sample_s
@@ -93,7 +92,7 @@ class LooseConnector(Additive):
 
 
 class Staircase(Additive):
-    """A table of corrections with unequal steps."""
+    """A table of corrections with unequal steps: the step that the board's temperature lies on."""
 
     name, known, stage, form = "unequal_stairs", False, "readout", "unequal steps over temperature"
 
@@ -104,7 +103,6 @@ class Staircase(Additive):
         return found | {f"height_{k}": float(rng.standard_normal()) for k in range(13)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """The step that the board's temperature lies on."""
         edges = np.array([shape[f"edge_{k}"] for k in range(12)])
         heights = np.array([shape[f"height_{k}"] for k in range(13)])
         return heights[np.searchsorted(edges, world.nodes["T_board"])]

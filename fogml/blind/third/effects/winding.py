@@ -84,25 +84,23 @@ class ShupeDelayed(Additive):
 
 
 class MohrSaturating(Additive):
-    """Strain by the rate that saturates in fast ramps."""
+    """Strain by the rate that saturates in fast ramps: r tanh(rate / r) (1 + s u)."""
 
     name, form = "shupe_mohr", "saturating in the rate"
     ranges = {"fast": (0.2, 1.5), "slope": (-0.015, 0.015)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """r tanh(rate / r) (1 + s u)."""
         rate, fast = world.rates["T_middle"], shape["fast"]
         return fast * np.tanh(rate / fast) * (1.0 + shape["slope"] * (world.nodes["T_hub"] - 25.0))
 
 
 class ProductOfHub(Additive):
-    """The hub's temperature by the cover's rate."""
+    """The hub's temperature by the cover's rate: (T_hub - T_0) late(dT_cover/dt)."""
 
     name, form = "temperature_rate_product", "hub by cover"
     ranges = {"middle": (0.0, 50.0), "delay": (50.0, 500.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """(T_hub - T_0) late(dT_cover/dt)."""
         rate = late(world.rates["T_cover"], shape["delay"], world.sample_s)
         return (world.nodes["T_hub"] - shape["middle"]) * rate
 
@@ -166,13 +164,12 @@ class StickingLayers(Additive):
 
 
 class LoopOfDuhem(Additive):
-    """Coleman and Hodgdon's loop."""
+    """Coleman and Hodgdon's loop: z over the winding's temperature."""
 
     name, form = "thermal_hysteresis", "Duhem"
     ranges = {"quickness": (0.04, 0.25), "knee": (15.0, 60.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """z over the winding's temperature."""
         return duhem(world.nodes["T_middle"], shape["quickness"], shape["knee"], world.past)
 
 
@@ -192,13 +189,12 @@ class LoopOneSided(Additive):
 
 
 class ScaleLoopOfDuhem(ScaleFactor):
-    """Coleman and Hodgdon's loop in the scale factor."""
+    """Coleman and Hodgdon's loop in the scale factor: z over the winding's temperature."""
 
     name, form = "sf_hysteresis", "Duhem"
     ranges = {"quickness": (0.04, 0.25), "knee": (15.0, 60.0)}
 
     def error(self, world: World, shape: Shape) -> FloatArray:
-        """z over the winding's temperature."""
         return duhem(world.nodes["T_middle"], shape["quickness"], shape["knee"], world.past)
 
 
@@ -226,13 +222,12 @@ class StressFractional(Additive):
 
 
 class HiddenMount(Additive):
-    """The mount, which air and tray both warm."""
+    """The mount, which air and tray both warm: mount and a share of the tray less winding."""
 
     name, stage, form, records = "hidden_thermal_node", "thermal", "the mount", ("T_chamber",)
     ranges = {"tray": (0.0, 0.5)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Mount and a share of the tray less winding."""
         share = shape["tray"]
         there = (1.0 - share) * world.nodes["T_mount"] + share * world.nodes["T_tray"]
         return there - world.nodes["T_coil"]
@@ -251,22 +246,20 @@ class OtherInside(Additive):
 
 
 class AgeingSettles(Additive):
-    """Ageing that comes to an end within days."""
+    """Ageing that comes to an end within days: 1 - exp(-t / tau) since the first run."""
 
     name, form = "ageing", "settling exponentially"
     ranges = {"days": (0.05, 3.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """1 - exp(-t / tau) since the first run."""
         return -np.expm1(-(world.since_first + world.time) / (86400.0 * shape["days"]))
 
 
 class TurnOnOfLaplace(Additive):
-    """Mostly the same bias after power-on, and at times quite another one."""
+    """Mostly the same bias after power-on, and at times quite another one: a constant of this run."""
 
     name, form, several_runs, drawn_per_run = "turn_on_bias", "Laplace's distribution", True, True
     demands = Demands(power_on=True)
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """A constant of this run."""
         return np.full(len(world.time), rng.laplace())
