@@ -38,13 +38,7 @@ RUNNING = ProgramLimits(cpu_s=120, wall_s=300.0, memory_bytes=1 << 30, output_by
 
 
 def host_compiler() -> str:
-    """The C compiler of this machine: ``$CC``, or the first found of cc, gcc and clang.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """The C compiler of this machine: ``$CC``, or the first found of cc, gcc and clang."""
     for name in (os.environ.get("CC", ""), *COMPILERS):
         if name and shutil.which(name):
             return name

@@ -154,13 +154,7 @@ TARGETS: dict[str, tuple[str, Callable[[NoiseParameters], str]]] = {
 
 
 def check_target(to: str) -> None:
-    """Check that something reads the terms under this name.
-
-    Raises
-    ------
-    InputError
-        If not, listing what does.
-    """
+    """Check that something reads the terms under this name."""
     if to not in TARGETS:
         raise InputError(f"--to '{to}' is not known; {known_are(to, TARGETS)}")
 

@@ -129,13 +129,7 @@ def export_tables(
 
 
 def read_matrix(path: Path, axes: int = 3) -> FloatArray:
-    """A 3 x 3 matrix of a YAML or JSON file: three rows, alone or under the key ``matrix``.
-
-    Raises
-    ------
-    InputError
-        If it is none, or the models are not of three axes.
-    """
+    """A 3 x 3 matrix of a YAML or JSON file: three rows, alone or under the key ``matrix``."""
     held = read_yaml(path)
     rows = held.get("matrix") if isinstance(held, Mapping) else held
     numbers = (

@@ -12,14 +12,7 @@ from fogml.runs.run import Run
 
 
 def check_suits(features: Features, runs: Sequence[Run]) -> None:
-    """Refuse features that training runs can tell nothing of.
-
-    Raises
-    ------
-    InputError
-        Pointing at a time constant that is longer than every run or shorter than a sample interval, or at a
-        half width that is beyond the recorded range.
-    """
+    """Refuse features that training runs can tell nothing of."""
     for atom in features.atoms:
         told = unsuited(atom, runs)
         if told is not None:

@@ -76,13 +76,7 @@ class Prior:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Prior:
-        """The prior that `as_dict` wrote.
-
-        Raises
-        ------
-        InputError
-            If the numbers do not make a prior.
-        """
+        """The prior that `as_dict` wrote."""
         try:
             return strictly(cls, values, "prior").checked()
         except InputError as error:

@@ -126,12 +126,6 @@ def container_blocks(
     """The table of a file of groups in blocks of at most `rows` rows; whole for None.
 
     Only time, gyro and `columns` are read where these are given.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged, reading it takes more than `limits`, or no group holds a clock and a gyro; the
-        message lists what it holds.
     """
     with stored_file(path, kind, (), limits) as stored:
         groups = groups_of(stored, kind)
@@ -260,13 +254,7 @@ def _clock_of(path: Path, stored: StoredFile, group: Group) -> FloatArray:
 def sheet_blocks(
     path: Path, rows: int, columns: Collection[str] | None = None, limits: ReadingLimits = DEFAULT_LIMITS
 ) -> Iterator[RawTable]:
-    """The table of the worksheet with a clock and a gyro, else of the first, as `csv_blocks` reads CSV.
-
-    Raises
-    ------
-    InputError
-        As `container_blocks` and `csv_blocks`; rows of the sheet are called lines.
-    """
+    """The table of the worksheet with a clock and a gyro, else of the first, as `csv_blocks` reads CSV."""
     folder = _Folder()
     for table in csv_blocks(_sheet(path, folder, limits), rows, columns):
         yield _keeping(table, folder)

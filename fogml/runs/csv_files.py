@@ -64,11 +64,6 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
     """The table of a CSV file.
 
     With `repair`, rows that can't be read are dropped and counted.
-
-    Raises
-    ------
-    InputError
-        Naming line and column of the first fault.
     """
     import pyarrow as arrow
 
@@ -100,11 +95,6 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
     """The table of a CSV file in blocks of rows; no repair.
 
     Only time, gyro and `columns` are read where these are given.
-
-    Raises
-    ------
-    InputError
-        Naming line and column of the first fault.
     """
     import pyarrow as arrow
 

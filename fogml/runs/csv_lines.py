@@ -62,13 +62,7 @@ class LineReader:
     text_lines: dict[int, int] = field(default_factory=dict)
 
     def tables(self, rows: int = _CHUNK_ROWS, skip: int = 0) -> Iterator[RawTable]:
-        """Tables of at most `rows` rows, after so many data rows that are skipped.
-
-        Raises
-        ------
-        InputError
-            Naming line and column of the first fault, unless it is repaired.
-        """
+        """Tables of at most `rows` rows, after so many data rows that are skipped."""
         values: list[list[float]] = []
         stamps: list[list[str]] = []
         lines: list[int] = []
@@ -94,13 +88,7 @@ class LineReader:
             yield self._table(values, lines, stamps, clock)
 
     def whole(self) -> RawTable:
-        """The whole table, with what was noticed.
-
-        Raises
-        ------
-        InputError
-            As `tables`, or if no row is left.
-        """
+        """The whole table, with what was noticed."""
         tables = list(self.tables())
         if not tables:
             if self.first_fault is None:

@@ -170,13 +170,7 @@ def seconds_between(earlier: datetime, later: datetime, what: str) -> float:
 
 
 def facts_from(values: Any, source: str) -> Facts:
-    """Check set-up facts read from `source`.
-
-    Raises
-    ------
-    InputError
-        Naming the key, what was found and what is accepted.
-    """
+    """Check set-up facts read from `source`."""
     if values is None:
         return Facts()
     if not isinstance(values, dict):
@@ -222,13 +216,7 @@ def read_side_file(run_path: Path) -> Facts:
 
 
 def stated_facts(side: Path) -> Facts:
-    """The facts in a file.
-
-    Raises
-    ------
-    InputError
-        As `read_side_file`, and if it is an import profile.
-    """
+    """The facts in a file."""
     return facts_from(read_yaml(side, NAMES), side.name)
 
 

@@ -59,11 +59,6 @@ def hdf5_blocks(
     """The table of an HDF5 file in blocks of `rows` rows; all at once for None.
 
     Only time, gyro and `columns` are read where these are given.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged, reading it takes more than `limits`, or it holds no columns of one length.
     """
     h5py_module()
     with stored_file(path, "hdf5", (FACTS_KEY, *Facts.model_fields), limits) as stored:

@@ -23,13 +23,7 @@ PART_BYTES = 1 << 23
 
 
 def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[bytes, bool]]:
-    """Parts of a text, and whether each is the last one.
-
-    Raises
-    ------
-    InputError
-        If the file can't be read, is empty, or is no text of that encoding.
-    """
+    """Parts of a text, and whether each is the last one."""
     ready = begun = b""
     read = 0
     only_returns = False

@@ -46,12 +46,6 @@ def mat_blocks(
 
     Only time, gyro and `columns` are read where these are given. The process that reads
     it holds a variable of version 5 whole while it is unpacked.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged, reading it takes more than `limits`, or it holds no numeric vectors of one
-        length.
     """
     with stored_file(path, "mat", (), limits) as stored:
         units, stated = stored.told["units"], stored.told["facts"]

@@ -30,12 +30,6 @@ def parquet_blocks(
     """The table of a Parquet file in blocks of at most `rows` rows, in bounded memory; whole for None.
 
     Only time, gyro and `columns` are read where these are given.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged, reading it takes more than `limits`, or a column of the run format holds no
-        numbers.
     """
     with stored_file(path, "parquet", (FACTS_KEY, *Facts.model_fields), limits) as stored:
         vectors, findings = [], []
@@ -58,37 +52,19 @@ def parquet_blocks(
 
 
 def parquet_rows(path: Path) -> int:
-    """Number of rows of a Parquet file.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged.
-    """
+    """Number of rows of a Parquet file."""
     with stored_file(path, "parquet", (), DEFAULT_LIMITS) as stored:
         return max((max(array.shape) for array in stored.arrays), default=0)
 
 
 def parquet_values(path: Path) -> int:
-    """Number of values of a Parquet file, in all its columns.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged.
-    """
+    """Number of values of a Parquet file, in all its columns."""
     with stored_file(path, "parquet", (), DEFAULT_LIMITS) as stored:
         return sum(max(array.shape) for array in stored.arrays)
 
 
 def parquet_marks(path: Path, cell: str) -> NDArray[np.str_]:
-    """The texts of a column of marks, shape (n,), by its header cell.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged.
-    """
+    """The texts of a column of marks, shape (n,), by its header cell."""
     with stored_file(path, "parquet", (), DEFAULT_LIMITS) as stored:
         return stored.marks(_named(stored, cell))
 

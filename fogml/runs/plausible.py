@@ -92,13 +92,7 @@ def compensated_by(run: Run) -> str | None:
 
 
 def refuse_twice(run: Run) -> None:
-    """Refuse to compensate what is compensated.
-
-    Raises
-    ------
-    InputError
-        If the run says that it is.
-    """
+    """Refuse to compensate what is compensated."""
     said = compensated_by(run)
     if said is not None:
         raise InputError(f"{run.name}: compensated already ({said}); compensate what it was made of")

@@ -108,13 +108,7 @@ def float32_reason(time: FloatArray) -> str | None:
 
 
 def as_vector(run: str, name: str, values: ArrayLike) -> FloatArray:
-    """A column as float64, shape (n,); dates and durations as seconds, dates since the first.
-
-    Raises
-    ------
-    InputError
-        Naming run and column, if it is no vector of numbers.
-    """
+    """A column as float64, shape (n,); dates and durations as seconds, dates since the first."""
     array = np.asarray(values)
     if name == "time" and (array.dtype.kind in "mM" or _holds_dates(array)):
         return _seconds(run, values)
@@ -158,13 +152,7 @@ def _seconds(run: str, values: ArrayLike) -> FloatArray:
 
 
 def check_columns(run: str, columns: Mapping[str, FloatArray]) -> None:
-    """Refuse columns that are no recording: faulty values, a clock that does not go on.
-
-    Raises
-    ------
-    InputError
-        Naming run, column, the first sample at fault, and what to do.
-    """
+    """Refuse columns that are no recording: faulty values, a clock that does not go on."""
     for name, values in columns.items():
         bad = faulty(name, values)
         if bad is not None:

@@ -55,13 +55,7 @@ class _Field:
 
 
 def draft_profile(path: Path) -> str:
-    """The text of an import profile (YAML) for a file: what is sure, and what is a guess and why.
-
-    Raises
-    ------
-    InputError
-        If the file can't be read, or holds no rows of numbers.
-    """
+    """The text of an import profile (YAML) for a file: what is sure, and what is a guess and why."""
     kind = file_format(path)
     if kind == "workbook":
         with sheet_file(path) as sheet:

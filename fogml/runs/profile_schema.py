@@ -162,13 +162,7 @@ class ImportProfile(TextLayout):
 
 
 def check_joined(log: JoinedLog) -> None:
-    """Refuse a log beside the recording that is elsewhere, or holds no clock or nothing else.
-
-    Raises
-    ------
-    ValueError
-        Naming the key.
-    """
+    """Refuse a log beside the recording that is elsewhere, or holds no clock or nothing else."""
     if "/" in log.file or "\\" in log.file or log.file.startswith("."):
         raise ValueError(
             f"key 'join.file': {quoted(log.file)}: a name in the recording's folder was expected"

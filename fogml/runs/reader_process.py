@@ -155,13 +155,7 @@ class _Fault(Exception):
 
 @contextlib.contextmanager
 def stored_file(path: Path, kind: str, keys: Sequence[str], limits: ReadingLimits) -> Iterator[StoredFile]:
-    """A file opened in the other process; `keys` are the attributes that are read.
-
-    Raises
-    ------
-    InputError
-        If it is damaged, takes longer or more memory than `limits`, or its reader ends.
-    """
+    """A file opened in the other process; `keys` are the attributes that are read."""
     reader = reader_of(kind)
     if reader.extra is not None and importlib.util.find_spec(reader.package.partition(".")[0]) is None:
         raise InputError(extra_hint(reader, path))

@@ -100,11 +100,6 @@ def read_runs(
     """Read the runs in a file, as `read_run`: one, or with `repair` one for each restart of its clock.
 
     Legs are named ``FILE leg 1`` and so on; a stated time of power-on belongs to the first.
-
-    Raises
-    ------
-    InputError
-        As `read_run`.
     """
     path = Path(path)
     with unchanged(*run_sources(path)):
@@ -227,13 +222,7 @@ def _cut(run: Run, columns: Collection[str] | None, block_rows: int) -> Iterator
 
 
 def read_table(path: Path) -> RawTable:
-    """The table in a file of any format as it stands, whatever its columns; nothing is repaired.
-
-    Raises
-    ------
-    InputError
-        Naming the fault.
-    """
+    """The table in a file of any format as it stands, whatever its columns; nothing is repaired."""
     with unchanged(path):
         return _read_table(path, file_format(path), False, DEFAULT_LIMITS)
 

@@ -60,13 +60,7 @@ class ReadingLimits:
         )
 
     def check_repair(self, path: Path, size_mb: float) -> None:
-        """Refuse to repair a file that is too long to be held.
-
-        Raises
-        ------
-        InputError
-            Naming the file, and the way on.
-        """
+        """Refuse to repair a file that is too long to be held."""
         if size_mb > self.repair_mb:
             raise InputError(
                 f"{path.name}: {size_mb:.0f} MB, and --repair holds a file in memory, up to "
@@ -75,13 +69,7 @@ class ReadingLimits:
             )
 
     def check_size(self, path: Path, values: float) -> None:
-        """Refuse a file that states more values of 8 bytes than it can hold.
-
-        Raises
-        ------
-        InputError
-            Naming the file.
-        """
+        """Refuse a file that states more values of 8 bytes than it can hold."""
         if 8.0 * values > self.expansion * path.stat().st_size + 1e6 * self.spare_mb:
             raise InputError(
                 f"{path.name}: damaged: it states {values:.3g} values, more than a file of its size can "

@@ -32,11 +32,6 @@ def read_gnss_ins_sim(folder: str | Path, axis: str | None) -> tuple[FloatArray,
     """Time [s] and rate [deg/h] about one axis in a folder that gnss-ins-sim wrote, each of shape (n,).
 
     `axis` is one of `AXES`; with a minus, that of a gyro whose input axis points the other way.
-
-    Raises
-    ------
-    InputError
-        Naming the file that is missing, or what of it is not as expected.
     """
     folder = Path(folder)
     if axis not in AXES:

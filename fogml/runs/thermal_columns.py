@@ -27,11 +27,6 @@ def thermal_columns(run: Run) -> Callable[[FloatArray], FloatArray]:
     """Columns that a drift with a run's temperature may follow, at times [s], shape (times, columns).
 
     They are kept out where a run's own noise is told beside its drift.
-
-    Raises
-    ------
-    ValueError
-        If the run holds no temperature.
     """
     temperature = leading_temperature(run)
     if temperature is None:

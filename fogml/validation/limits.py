@@ -69,13 +69,7 @@ STRICT_CODES = ("small_temperature_span", "outside_training", "seen_in_training"
 
 
 def hold_strict(findings: Iterable[tuple[str, Sequence[Finding]]]) -> None:
-    """Raise for the first finding that strictness does not allow.
-
-    Raises
-    ------
-    InputError
-        Naming the run and what was found.
-    """
+    """Raise for the first finding that strictness does not allow."""
     for name, found in findings:
         for finding in found:
             if finding.code in STRICT_CODES:
