@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray
 from fogml.features.atoms import AtomValues
-from fogml.models.arrays import expect_arrays
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.compact import Compact, affine
 from fogml.models.intervals import interval_table, out_of_fold_intervals
+from fogml.models.parameters import expect_arrays
 from fogml.models.table import RunRows, TrainingTable, row_count, usable_rows
 from fogml.runs.run import Run
 from fogml.strict import Strict, strictly

@@ -12,10 +12,9 @@ from pydantic import Field
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.models.arrays import expect_arrays
 from fogml.models.compact import affine
 from fogml.models.folds import dealt_folds
-from fogml.models.parameters import check_parameters
+from fogml.models.parameters import check_parameters, expect_arrays
 from fogml.models.scikit_learn import (
     BaseEstimator,
     Interval,

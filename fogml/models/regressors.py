@@ -39,8 +39,8 @@ from fogml.arrays import FloatArray
 from fogml.entry_points import loaded, origin
 from fogml.errors import FogmlError, InputError, first_line, quoted
 from fogml.features.features import Features
-from fogml.models.arrays import expect_arrays
 from fogml.models.folds import FOLDS
+from fogml.models.parameters import expect_arrays
 from fogml.models.scikit_learn import clone
 from fogml.models.table import TrainingTable
 

@@ -29,11 +29,11 @@ from pydantic import Field
 
 from fogml.errors import InputError, quoted
 from fogml.json_files import content_hash, json_object, json_text, read_bytes, read_json
-from fogml.models.arrays import arrays_from_bytes, arrays_to_bytes
 from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
 from fogml.models.intervals import saved_intervals
 from fogml.models.names import PRESETS
+from fogml.models.parameters import arrays_from_bytes, arrays_to_bytes
 from fogml.models.regressors import SKOPS, own_regressors
 from fogml.outputs import whole_folder
 from fogml.strict import Strict, as_written, strictly

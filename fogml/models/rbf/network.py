@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
-from fogml.models.arrays import expect_arrays
+from fogml.models.parameters import expect_arrays
 from fogml.models.rbf.evaluate import basis_functions, evaluate_network
 from fogml.models.rbf.objective import LINEAR_PRECISION
 from fogml.models.rbf.rates import Edge
