@@ -3,6 +3,8 @@
 The table is scikit-learn's own, ``_parameter_constraints``: parameter to what it may be, e.g.
 ``{"ridge": [Interval(Real, 0.0, None, closed="left"), StrOptions({"auto"})]}``. Scikit-learn's
 regressors have one each, and fogml's have one of the same form.
+
+And arrays of saved models: to bytes in safetensors' form and back, of stated type and shape, finite.
 """
 
 from __future__ import annotations
