@@ -21,9 +21,9 @@ ABSTAIN = "abstain"
 """The baseline that names nothing."""
 METHODS = {
     DIAGNOSIS: f"{_PACKAGE}.methods:diagnosis",
-    "bic": f"{_PACKAGE}.baselines.forward:bic",
-    "bic-unwhitened": f"{_PACKAGE}.baselines.forward:bic_unwhitened",
-    "bic-fixed-nominal": f"{_PACKAGE}.baselines.forward:bic_fixed_nominal",
+    "bic": f"{_PACKAGE}.baselines.regression:bic",
+    "bic-unwhitened": f"{_PACKAGE}.baselines.regression:bic_unwhitened",
+    "bic-fixed-nominal": f"{_PACKAGE}.baselines.regression:bic_fixed_nominal",
     "stlsq": f"{_PACKAGE}.baselines.learners:stlsq",
     "random-forest": f"{_PACKAGE}.baselines.learners:random_forest",
     "gp-discrepancy": f"{_PACKAGE}.baselines.learners:gp_discrepancy",

@@ -48,7 +48,7 @@ def test_each_operator_and_number_is_changed_once() -> None:
 
 def test_a_draw_is_repeated_and_of_every_package(tmp_path) -> None:
     root = Path(__file__).parents[2]
-    for file in ("errors.py", "twin/programme.py", "signals/waves.py"):
+    for file in ("errors.py", "twin/programme.py", "signals/bases.py"):
         (tmp_path / "fogml" / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(root / "fogml" / file, tmp_path / "fogml" / file)
     every = drawn(tmp_path, 40, 7)
