@@ -10,6 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from fogml.fleet.summary import label_of
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
@@ -64,7 +65,7 @@ def distribution(fleet: Mapping[str, Any]) -> Drawing:
 def by_unit(fleet: Mapping[str, Any], order: Sequence[Mapping[str, Any]], outliers: set[str]) -> Drawing:
     """Rms before and after and the floor of each unit, in order of serial numbers."""
     units = [unit for unit in order if unit["after"] is not None]
-    labels = [_label(unit) for unit in units]
+    labels = [label_of(unit) for unit in units]
     figure = go.Figure()
     for key, symbol, colour in (
         ("before", "circle-open", style.TRAINING),
@@ -78,10 +79,10 @@ def by_unit(fleet: Mapping[str, Any], order: Sequence[Mapping[str, Any]], outlie
             name="noise floor" if key == "floor" else key,
             marker={"symbol": symbol, "size": 9, "color": colour},
         )
-    odd = [unit for unit in units if _label(unit) in outliers]
+    odd = [unit for unit in units if label_of(unit) in outliers]
     if odd:
         figure.add_scatter(
-            x=[_label(unit) for unit in odd],
+            x=[label_of(unit) for unit in odd],
             y=[unit["after"] for unit in odd],
             mode="markers",
             name="unlike the others",
@@ -166,7 +167,3 @@ def serial_axis(figure: go.Figure, labels: Sequence[str]) -> None:
         ticktext=words[::step],
         tickangle=-90 if len(labels) > 8 or max(map(len, words), default=0) > _LONGEST_LABEL // 2 else 0,
     )
-
-
-def _label(unit: Mapping[str, Any]) -> str:
-    return f"{unit['unit']} {unit['axis']}".strip()

@@ -9,6 +9,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.runs.facts import Facts
+from fogml.twin.chain import fresh
 from fogml.twin.effect import (
     SET_UP,
     Effect,
@@ -287,11 +288,6 @@ def hooks(
 def rms(values: FloatArray) -> float:
     """Root of the mean square."""
     return float(np.sqrt(np.mean(values * values)))
-
-
-def fresh(inputs: Inputs) -> Inputs:
-    """The inputs with no memory and nothing worked out yet."""
-    return replace(inputs, memory=Memory(), cache={})
 
 
 def signature(effect: Effect, inputs: Inputs, shape: Mapping[str, float]) -> FloatArray:
