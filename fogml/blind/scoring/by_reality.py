@@ -15,12 +15,11 @@ import numpy as np
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.scoring.statistics import Estimate, calibration_error, mean, proportion
 from fogml.blind.scoring.table import (
-    ENOUGH,
     calibration,
     case_ratio,
     false_names,
-    met,
     pooled,
+    row,
     seconds,
     share,
 )
@@ -225,14 +224,4 @@ def by_form(marks: Sequence[Mark]) -> list[dict[str, Any]]:
 
 def _row(wanted: Wanted, marks: Sequence[Mark]) -> dict[str, Any]:
     here = [m for m in marks if wanted.counts(m)]
-    estimate = wanted.measure(here)
-    return {
-        "key": wanted.key,
-        "words": wanted.words,
-        "format": wanted.format,
-        "wanted": {"low": wanted.low, "high": wanted.high},
-        **asdict(estimate),
-        "cases": len(here),
-        "met": met(wanted.low, wanted.high, estimate.value),
-        "enough": len(here) >= ENOUGH,
-    }
+    return row(wanted, here, wanted.measure(here))

@@ -239,20 +239,27 @@ def rows(marks: Sequence[Mark]) -> list[dict[str, Any]]:
         estimate = figure.measure(chosen) if chosen else NOTHING
         found.append(
             {
-                "key": figure.key,
-                "words": figure.words,
-                "format": figure.format,
-                "wanted": {"low": figure.low, "high": figure.high},
-                "prototype": figure.prototype,
-                **asdict(estimate),
-                "cases": len(chosen),
-                "met": met(figure.low, figure.high, estimate.value),
-                "enough": len(chosen) >= ENOUGH,
+                **row(figure, chosen, estimate, prototype=figure.prototype),
                 "by_stratum": _split(figure, marks, STRATUM_NAMES, lambda m: m.truth.stratum),
                 "by_kind": _split(figure, _evenly(figure, marks), figure.kinds, lambda m: m.truth.kind),
             }
         )
     return found
+
+
+def row(figure: Any, chosen: Sequence[Mark], estimate: Estimate, **more: str) -> dict[str, Any]:
+    """What a score says of a figure, one here or of `fogml.blind.scoring.by_reality`, over its cases."""
+    return {
+        "key": figure.key,
+        "words": figure.words,
+        "format": figure.format,
+        "wanted": {"low": figure.low, "high": figure.high},
+        **more,
+        **asdict(estimate),
+        "cases": len(chosen),
+        "met": met(figure.low, figure.high, estimate.value),
+        "enough": len(chosen) >= ENOUGH,
+    }
 
 
 def _evenly(figure: Figure, marks: Sequence[Mark]) -> Sequence[Mark]:
