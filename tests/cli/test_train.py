@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import pytest
 import yaml
@@ -198,12 +199,11 @@ def test_a_closed_folder_is_found_before_training(invoke, run_files, tmp_path, m
 
 
 def test_a_failure_while_writing_leaves_nothing(invoke, run_files, tmp_path, monkeypatch):
-    from fogml.report import train_page
 
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(train_page, "train_page", full)
+    monkeypatch.setattr(sys.modules["fogml.report.train_page"], "train_page", full)
     result = invoke("train", run_files[0], "--test", run_files[1], *QUICK, "-o", tmp_path / "out", status=2)
     assert "No space left" in result.stderr
     assert not (tmp_path / "out").exists()
