@@ -16,7 +16,7 @@ from fogml.features.signal import TIME_ON, Signal, number_text
 from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 from fogml.signals.clock import Clock
-from fogml.signals.recursions import MemoryOperator
+from fogml.signals.memory import MemoryOperator
 
 Operator = Literal["value", "lag", "play", "since_on", "beyond", "diff", "d", "sign"]
 

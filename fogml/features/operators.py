@@ -30,7 +30,7 @@ from fogml.features.traced import decayed, forgotten, larger, smaller, where
 from fogml.signals import windows
 from fogml.signals.clock import EDGE_TOLERANCE, EXPONENTIAL_SPAN, Clock
 from fogml.signals.kernel_windows import Kernel, kernel_rate
-from fogml.signals.recursions import Lag, Play
+from fogml.signals.memory import Lag, Play
 
 Method = Literal["block", "slope", "exp", "first"]
 METHODS: tuple[Method, ...] = get_args(Method)

@@ -25,7 +25,7 @@ from fogml.entry_points import loaded
 from fogml.errors import InputError
 from fogml.signals.clock import EXPONENTIAL_SPAN, check_window, longest_gap_s, needed_s
 from fogml.signals.kernel_windows import Kernel
-from fogml.signals.recursions import MemoryOperator
+from fogml.signals.memory import MemoryOperator
 
 GROUP = "fogml.operators"
 KINDS = ("s", "x", "1")

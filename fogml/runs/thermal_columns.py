@@ -9,7 +9,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 from fogml.signals import large
-from fogml.signals.recursions import Lag
+from fogml.signals.memory import Lag
 
 _LAGS_S = (60.0, 300.0, 1200.0, 3600.0)
 """Time constants of the temperature's lags that a drift may follow [s]: those of coils and housings."""

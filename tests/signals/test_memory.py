@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from fogml.errors import InputError
 from fogml.features.operators import SINCE_ON
-from fogml.signals.recursions import Lag, Play
+from fogml.signals.memory import Lag, Play
 
 
 def test_a_lag_behind_a_ramp_is_its_rate_times_the_time_constant() -> None:
