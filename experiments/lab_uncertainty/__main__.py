@@ -12,6 +12,7 @@ from typing import Any
 from experiments.lab_uncertainty import (
     certificates,
     fleets,
+    floors,
     joint,
     lines,
     models,
@@ -89,6 +90,14 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         "Of B and R that are none an interval begins at 0. Before, R was told where there is none in "
         "27 % of runs of navigation grade at 10 Hz over 4 h, as its error left out a random walk that hardly "
         "shows.",
+    ),
+    (
+        "Noise floors of a judgement (`train`, `compare`)",
+        floors,
+        40,
+        "The truth is what noise leaves in averages of a run as long, its mean taken off; under ramps "
+        "without a random walk, which counts as drift. Before, intervals knew nothing of slow noise that a "
+        "run does not tell: wrong were 20 % of tactical and navigation grade still, 22 to 42 % under ramps.",
     ),
     (
         "Promises of a plan (`plan`)",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from fogml.errors import InputError
 from fogml.export.c_program import FLAGS, CProgram
 from fogml.export.c_source import CSource
 from fogml.export.plan import Plan
-from fogml.export.points import POINTS, box_points, history
+from fogml.export.points import POINTS, History, box_points, history
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel
 from fogml.models.folds import dealt_folds
@@ -23,6 +23,8 @@ from fogml.models.table import run_rows
 from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 
+READING_STEP_DEGC = 1.0 / 16.0
+"""Steps of a thermometer in use, a DS18B20's, in which a history is read where windows are held in bins."""
 _BEYOND = 0.2
 _TURN_DEG_H = 36_000.0
 
@@ -88,20 +90,20 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
     fixed = source.numbers["fixed"]
     gyro_step = float(fixed["gyro_value"]) if fixed else 0.0
     past = history(plan, seed)
-    counts = fixed and plan.gives_rate and plan.gyro_unit == "count"
-    gyro = np.round(past.gyro / gyro_step) * gyro_step if counts else past.gyro
-    expected, flags = plan.compensated(past.atoms(plan), gyro)
-    if fixed:
+    gyro = past.gyro
+    if fixed and plan.gives_rate and plan.gyro_unit == "count":
         # Counts are whole; what whole steps of temperatures and outputs lose is part of the difference.
-        temperatures = np.round(past.temperatures / fixed["temperature_value"])
-        out, told = program.steps(past.time, temperatures, np.round(gyro / gyro_step))
-        out = out * fixed["compensated_value"]
-    else:
-        out, told = program.steps(past.time, past.temperatures, gyro)
-    off = np.abs(out.astype(np.float64) - expected)
+        gyro = np.round(gyro / gyro_step) * gyro_step
+    past = replace(past, gyro=gyro)
+    off, flags, told = _over_history(plan, source, program, past)
     inside, outside = _largest(off[flags != 1]), _largest(off[flags == 1])
     count, good = len(off), int(np.count_nonzero(flags == 0))
     differ = int(np.count_nonzero(told != flags))
+    if source.layout.binned and all(atom.operator != "sign" for atom in plan.atoms):
+        # Bins take samples for evenly rising, which a thermometer that shows steps does not. Of a soak's
+        # direction steps leave nothing to compare.
+        off, flags, _ = _over_history(plan, source, program, past.in_steps(plan, READING_STEP_DEGC))
+        inside, outside = max(inside, _largest(off[flags == 0])), max(outside, _largest(off[flags == 1]))
     if not plan.atoms:
         return Difference(inside, outside, 0, count, good, differ)
     near = _atoms_off(plan, source, program, box_points(plan, seed), gyro[0])
@@ -114,6 +116,20 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
     return Difference(
         max(inside, _largest(near)), max(outside, _largest(far)), POINTS, count, good, differ, ppm
     )
+
+
+def _over_history(
+    plan: Plan, source: CSource, program: CProgram, past: History
+) -> tuple[FloatArray, NDArray[np.int8], NDArray[np.int32]]:
+    """How far C is from the plan over a history [deg/h], the plan's flags and those of C, each (n,)."""
+    fixed = source.numbers["fixed"]
+    expected, flags = plan.compensated(past.atoms(plan), past.gyro)
+    if fixed is None:
+        out, told = program.steps(past.time, past.temperatures, past.gyro)
+        return np.abs(out.astype(np.float64) - expected), flags, told
+    temperatures = np.round(past.temperatures / fixed["temperature_value"])
+    out, told = program.steps(past.time, temperatures, np.round(past.gyro / fixed["gyro_value"]))
+    return np.abs(out * fixed["compensated_value"] - expected), flags, told
 
 
 def _atoms_off(plan: Plan, source: CSource, program: CProgram, atoms: FloatArray, gyro: float) -> FloatArray:

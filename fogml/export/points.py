@@ -69,6 +69,14 @@ class History:
         nominal = ScaleFactor(value=1.0 / float(plan.arrays["scale"][0]))
         return Run("history", columns, Facts(scale_factor=nominal), "count")
 
+    def in_steps(self, plan: Plan, step_degC: float) -> History:
+        """The same with temperatures in whole steps, as a thermometer shows them."""
+        paths = self.temperatures.copy()
+        for place, name in enumerate(plan.sensors):
+            if is_temperature(name):
+                paths[:, place] = np.round(paths[:, place] / step_degC) * step_degC
+        return History(self.time, paths, self.gyro)
+
     def atoms(self, plan: Plan) -> AtomValues:
         """Values of a plan's atoms, as the library works them out."""
         if not plan.atoms:

@@ -19,11 +19,13 @@ from itertools import chain, combinations
 import numpy as np
 
 from fogml.arrays import FloatArray, IntArray
-from fogml.intervals import MEDIAN_SIZE, Z90
+from fogml.intervals import LEVEL, MEDIAN_SIZE
 from fogml.signals import large
 from fogml.signals.averages_noise import FastNoise, averages_variance, fast_noise
+from fogml.signals.distributions import students_ppf
 from fogml.signals.noise_spectrum import Rows, spectrum_of
 from fogml.signals.output_filters import SpectrumTerms
+from fogml.signals.slow_noise import slow_fits
 from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel
 
 _SPIKE = 8.0
@@ -129,6 +131,9 @@ class FloorModel:
     sample_s: float
     counted: tuple[str, ...]
     fast: FastNoise
+    slow: tuple[tuple[SpectrumModel, SpectrumFit], ...]
+    slow_weights: FloatArray
+    """Models at any size of slow noise that the run allows."""
     loud: float = 0.0
     """Share of the rows that is loud, or a step, and is left out."""
 
@@ -138,7 +143,7 @@ class FloorModel:
             source += f" without the {self.loud:.0%} of it that is loud"
         measured, its_variance = self.fast.averages_variance(averaging_s, windows)
         squares, errors = [], []
-        for model, fit in self.fits:
+        for model, fit in (*self.fits, *self.slow):
             share = np.array(
                 [
                     averages_variance(name, self.sample_s, averaging_s, windows, self.fast.from_hz)
@@ -149,13 +154,17 @@ class FloorModel:
             )
             squares.append(measured + float(share @ fit.coefficients))
             errors.append(its_variance + float(share @ _covariance(model, fit) @ share))
-        square = float(self.weights @ squares)
-        variance = float(self.weights @ (np.array(errors) + (np.array(squares) - square) ** 2))
+        square = float(self.weights @ squares[: len(self.fits)])
         if square <= 0.0:
             return Floor(0.0, 0.0, 0.0, source)
-        spread = 0.5 * float(np.sqrt(np.log1p(variance / square**2)))
+        # Half by what the data speak for, half by slow noise of any size that they allow.
+        weights = 0.5 * np.concatenate((self.weights, self.slow_weights))
+        likely = np.maximum(squares, 1e-12 * square)
+        spread = np.sqrt(np.log1p(np.array(errors) / likely**2)) + 1e-12
+        ends = students_ppf([0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], weights, np.log(likely), spread, np.inf)
+        lower, upper = np.exp(0.5 * ends)
         value = float(np.sqrt(square))
-        return Floor(value, value * float(np.exp(-Z90 * spread)), value * float(np.exp(Z90 * spread)), source)
+        return Floor(value, min(float(lower), value), max(float(upper), value), source)
 
 
 def floor_model(
@@ -228,7 +237,11 @@ def floor_model(
     chosen = weights[live] / weights[live].sum()
     whole = int(np.sum(stops - starts))
     loud = 1.0 - sum(map(len, stretches)) / whole
-    return FloorModel(tuple(fits[i] for i in live), chosen, sample_s, ("N", *own), fast, loud)
+    whole_model = fits[-1][0]
+    found, shares = slow_fits(whole_model, own[1:])
+    any_size = tuple((whole_model, fit) for fit in found)
+    likely = tuple(fits[i] for i in live)
+    return FloorModel(likely, chosen, sample_s, ("N", *own), fast, any_size, shares, loud)
 
 
 def _from(columns: Columns, first: int) -> Rows:

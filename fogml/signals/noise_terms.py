@@ -13,10 +13,10 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
 from fogml.signals.allan import AllanResult, allan_deviation
-from fogml.signals.noise_ramp import ramp
 from fogml.signals.noise_search import NoiseSearch, search_noise
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 from fogml.signals.output_filters import AFTER, term_shapes
+from fogml.signals.slow_noise import ramp
 from fogml.signals.spectrum_fit import SpectrumFit
 
 TermName = Literal["Q", "N", "B", "K", "R"]

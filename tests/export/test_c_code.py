@@ -24,7 +24,7 @@ from fogml.export.c_program import (
     instructions_per_sample,
 )
 from fogml.export.c_source import c_source
-from fogml.export.check import expected_outputs
+from fogml.export.check import c_difference, expected_outputs
 from fogml.export.plan import Plan
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
@@ -342,11 +342,11 @@ def test_what_a_cortex_m4_needs_is_counted_whole(model_of, tmp_path, dtype, leas
     assert 8 <= instructions_per_sample(source, tmp_path) < 200
 
 
-def fast_run(sample_s: float) -> Run:
-    """Ten minutes of a thermometer that shows steps of 1/256 degC with noise, at a high rate, with a gap."""
+def fast_run(sample_s: float, steps: float = 256.0) -> Run:
+    """Ten minutes of a thermometer that shows so many steps a degC with noise, at a high rate, with a gap."""
     time = sample_s * np.arange(round(600.0 / sample_s))
     T = 20.0 + 15.0 * np.sin(time / 400.0) + 2.0 * np.sin(time / 37.0)
-    T = np.round(256.0 * (T + 0.01 * np.random.default_rng(0).standard_normal(len(time)))) / 256.0
+    T = np.round(steps * (T + 0.01 * np.random.default_rng(0).standard_normal(len(time)))) / steps
     keep = (time < 200.0) | (time > 210.0)
     columns = {"time": time, "gyro": np.zeros(len(time)), "T_in": T, "T_out": T - 1.5 * np.cos(time / 500.0)}
     return Run("fast", {name: values[keep] for name, values in columns.items()})
@@ -365,6 +365,19 @@ def test_bins_of_samples_are_the_windows_at_any_rate(model_of, tmp_path, name, d
     bound = 1e-4 if dtype.startswith("float") else 1e-3
     assert np.abs(out - expected.compensated)[good].max() < bound
     assert np.count_nonzero(flag != expected.flag) <= 4 and good.sum() > 100
+
+
+@pytest.mark.parametrize("dtype", ["float64", "q31"])
+def test_the_difference_stated_holds_of_a_thermometer_that_shows_steps(tmp_path, dtype):
+    """Bins take readings for evenly rising within them; on smooth ramps the two are the same to 1e-6."""
+    features = "T_in, dT_out[slope, 60 s], d(T_in-T_out)[block, 64 s], T_in*dT_in[slope, 30 s]"
+    model, run = make_model("polynomial", features=features).fit(training_run()), fast_run(0.05, 16.0)
+    source = c_source(Plan.of(model, 0.05), dtype, [])
+    program = CProgram(source, tmp_path, flags=QUICK)
+    out, _ = outputs(program, source, run)
+    expected = model.compensate(run)
+    off = np.abs(out - expected.compensated)[expected.flag == 0].max()
+    assert 1e-5 < off <= c_difference(source.plan, source, program, 0).inside < 1e-2
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32", "q15"])

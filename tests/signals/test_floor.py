@@ -98,11 +98,11 @@ def test_loud_parts_that_are_left_out_are_told():
     assert noise_floor(steady, 1.0, 100.0).source == "the run itself"
 
 
-def expected(windows: int, white: float, flicker: float) -> float:
-    """Floor of 100 s averages of white noise of a size per sample and flicker of B, from the covariance."""
+def expected(windows: int, white: float, flicker: float, over_s: float = 100.0) -> float:
+    """Floor of averages of white noise of a size per sample and flicker of B, from the covariance."""
     model = NoiseModel(white / 60.0, flicker)
-    time = 100.0 * np.arange(1, windows + 1)
-    covariance = model.covariance(time, 100.0, model.ladder(100.0, 100.0 * windows))
+    time = over_s * np.arange(1, windows + 1)
+    covariance = model.covariance(time, over_s, model.ladder(over_s, over_s * windows))
     return float(np.sqrt(np.trace(covariance) / windows - covariance.mean()))
 
 
@@ -125,6 +125,17 @@ def test_flicker_counts_and_drift_does_not():
     assert np.sqrt(squares) == pytest.approx(want, rel=0.01)
     time = 100.0 * np.arange(1, 361)
     assert floor_square(NoiseModel(0.3 / 60.0, 0.2), time, 100.0) == pytest.approx(want**2, rel=1e-6)
+
+
+def test_flicker_that_a_run_hardly_tells_is_in_the_interval():
+    want, held = expected(24, 1.2, 0.05, 300.0), 0
+    for seed in range(12):
+        white = 1.2 * np.random.default_rng(seed).normal(size=7200)
+        slow = Flicker(0.05, 1.0, np.random.default_rng(seed + 100)).block(7200)
+        found = noise_floor(white + slow, 1.0, 300.0)
+        assert found.lower <= found.value <= found.upper < 3.0 * found.value
+        held += found.lower <= want <= found.upper
+    assert held >= 9
 
 
 def test_a_floor_is_continuous_in_its_data():
