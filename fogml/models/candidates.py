@@ -180,6 +180,8 @@ class Score:
         The mean squares of m rows of white noise scatter by 2 s**4 / m; their sum of squares in these
         units is a chi-square of b - 1 degrees of freedom, exceeded by chance once in a thousand.
         """
+        if not self.mean_square > 0.0:
+            return True
         scatter = np.sum(self.rows * (self.squared_errors / self.mean_square - 1.0) ** 2) / 2.0
         return bool(scatter < chi2_ppf(0.999, len(self.rows) - 1))
 

@@ -28,7 +28,7 @@ from pydantic import Field, with_config
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.folds import Fold, run_folds, time_folds
-from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s
+from fogml.models.table import RunRows, TrainingTable, averaged_table, longest_interval_s, recorded_s
 from fogml.models.unseen_noise import unseen_noises
 from fogml.signals.averages import AVERAGING_S
 from fogml.signals.distributions import normal_ppf, student_ppf
@@ -157,8 +157,7 @@ def interval_table(rows: Sequence[RunRows]) -> TrainingTable:
     Atoms and not columns are averaged, so that the atoms of held-out rows can be limited to the
     box of the others, as in use; within 100 s the temperature hardly bends.
     """
-    sample_s = max(float(np.median(np.diff(part.time_s))) if len(part.y) > 1 else 0.0 for part in rows)
-    averaging_s = max(min(AVERAGING_S, recorded_s(rows) / _LEAST_AVERAGES), sample_s)
+    averaging_s = max(min(AVERAGING_S, recorded_s(rows) / _LEAST_AVERAGES), longest_interval_s(rows))
     return averaged_table(rows, lambda atoms: atoms, averaging_s)
 
 

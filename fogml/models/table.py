@@ -41,7 +41,7 @@ class TrainingTable:
         blocks of neighbouring rows; numbers go on from run to run. Blocks, never single rows,
         are what cross-validation and early stopping hold out.
     averaging_s
-        Time that a row averages over [s]; 0 where rows are single samples.
+        Time that a row stands for [s]: of an average, or between samples.
     notes
         What was left out, for the model's card.
     """
@@ -169,7 +169,7 @@ def averaged_table(rows: Sequence[RunRows], compose: Compose, averaging_s: float
         np.concatenate(index),
         np.concatenate(time_s),
         np.concatenate(block),
-        averaging_s,
+        averaging_s if averaging_s > 0.0 else longest_interval_s(rows),
         tuple(note for part in rows for note in part.notes),
     )
 
@@ -188,6 +188,11 @@ def row_count(rows: Sequence[RunRows]) -> int:
 def recorded_s(rows: Sequence[RunRows]) -> float:
     """Time that the rows stand for [s]: their number times the median interval, run by run."""
     return float(sum(len(part.y) * _sample_s(part.time_s) for part in rows))
+
+
+def longest_interval_s(rows: Sequence[RunRows]) -> float:
+    """Longest of the runs' median intervals between rows [s]."""
+    return max(_sample_s(part.time_s) for part in rows)
 
 
 def _sample_s(time_s: FloatArray) -> float:

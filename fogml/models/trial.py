@@ -24,7 +24,7 @@ from fogml.models.regressors import (
     parameter_count,
     predict_rows,
 )
-from fogml.models.table import RunRows, TrainingTable, recorded_s, run_rows
+from fogml.models.table import RunRows, TrainingTable, recorded_s, row_count, run_rows
 from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 
@@ -76,10 +76,12 @@ class Trial:
         union = union_of(self.candidates)
         self._column = {atom.text: column for column, atom in enumerate(union.atoms)}
         rows = [run_rows(run, union) for run in runs]
+        row_count(rows)
         averaged = averaged_rows(rows)
         self._atoms = np.concatenate([part.atoms for part in averaged])
         self._table = bare_table(averaged)
-        self.several_runs = len(runs) > 1
+        # A run shorter than the windows leaves no row.
+        self.several_runs = len(np.unique(self._table.run_index)) > 1
         self._partings: list[list[Fold]] = [time_folds(self._table, FOLDS, blocks_per_fold=BLOCKS_PER_FOLD)]
         if self.several_runs:
             self._partings.insert(0, run_folds(self._table))

@@ -170,7 +170,9 @@ def moving_temperatures(run: Run) -> dict[str, float]:
         return {}
     window_s = min(60.0, run.span_s / 4)
     averages = block_averages(run.time, *(run.temperature(name) for name in names), window_s=window_s)
-    spans = {name: float(np.ptp(values)) for name, values in zip(names, averages.values)}
+    # Short stretches far apart may fill no window.
+    told = averages.values if len(averages) else [run.temperature(name) for name in names]
+    spans = {name: float(np.ptp(values)) for name, values in zip(names, told)}
     return {name: span for name, span in spans.items() if span > MOVING_DEGC}
 
 

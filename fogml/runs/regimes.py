@@ -140,7 +140,7 @@ def _is_self_heating(motion: Motion, move: Move) -> bool:
     An exponential approach is at half way little more than half as fast as at its beginning; a
     chamber's ramp is as fast there, or faster.
     """
-    if move.start > 0 or move.direction < 0 or move.travel > GREATEST_SELF_HEATING_DEGC:
+    if move.start > 0 or move.direction < 0 or not 0.0 < move.travel <= GREATEST_SELF_HEATING_DEGC:
         return False
     progress = (motion.temperature[: move.stop] - motion.temperature[0]) / move.travel
     reached = [int(np.argmax(progress >= share)) for share in (0.2, 0.4, 0.6)]

@@ -240,7 +240,8 @@ def _onset(
     before, start, stop = span
     if start == before or grid.time[start - 1] - grid.time[before] < SHORTEST_STAY_S:
         return before
-    stay = values[max(before, int(np.searchsorted(grid.time, grid.time[start] - _LEVEL_S))) : start]
+    level = min(int(np.searchsorted(grid.time, grid.time[start] - _LEVEL_S)), start - 1)
+    stay = values[max(before, level) : start]
     left = direction * (values[start:stop] - np.median(stay)) > tolerance
     return start + int(np.argmax(left)) if left.any() else start
 

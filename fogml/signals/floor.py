@@ -209,7 +209,7 @@ def floor_model(
     # Faster noise does not matter to the averages; but short runs need all that they have.
     from_hz = min(0.5 * PER_WINDOW / averaging_s, 0.5 / sample_s)
     slow = spectrum.frequency_hz[:, -1] < from_hz
-    if float(spectrum.count[slow].sum()) < _FEWEST:
+    if float(spectrum.count[slow].sum()) < _FEWEST or not np.any(spectrum.power[slow] > 0.0):
         slow = np.ones(len(spectrum.power), dtype=np.bool_)
         from_hz = 0.5 / sample_s
     fast = fast_noise(spectrum, ~slow, from_hz, sum(map(len, stretches)))
@@ -232,6 +232,8 @@ def floor_model(
             fit = model.fit()
             fits.append((model, fit))
             evidence.append(-fit.loss - size * (1 + len(more) + len(drift)))
+    if not np.isfinite(max(evidence)):
+        return None
     weights = np.exp(np.array(evidence) - max(evidence))
     live = np.flatnonzero(weights > _LIGHT)
     chosen = weights[live] / weights[live].sum()

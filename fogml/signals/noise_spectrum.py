@@ -25,6 +25,8 @@ Rows = Callable[[slice], FloatArray]
 POINTS = 4
 """Frequencies at which a model is asked in a bin."""
 _BLOCKS = 4096
+_ROUNDING = 1e-12
+"""A column moves by rounding alone if it is nearer than this, relative to its size, to its mean."""
 _LONG = 1 << 16
 """Samples from which a series may lose a few at its end so that its transform is quick."""
 
@@ -146,6 +148,8 @@ def spectrum_of(
         (_block_means(tables[i], n, least), _block_means(_rows_of(stretches[i][:, None]), n, least), n)
         for i, n in zip(kept, lengths)
     ]
+    told = _told(coarse)
+    coarse = [(x * told, means, n) for x, means, n in coarse]
     removed = _least_squares(coarse)
     edges = _edges((single + 0.5) / longest, fine.per_octave)
     sums = np.zeros(len(edges) - 1)
@@ -234,6 +238,18 @@ def _block_means(rows: Rows, n: int, least: int) -> FloatArray:
     return np.asarray(np.concatenate(sums) / np.diff(edges)[:, None])
 
 
+def _told(stretches: Sequence[tuple[FloatArray, FloatArray, int]]) -> BoolArray:
+    """Which columns say anything: not those that move by rounding alone, nor any if they fit all values."""
+    centred = np.concatenate([x - x.mean(axis=0) for x, _, _ in stretches])
+    size = np.linalg.norm(np.concatenate([x for x, _, _ in stretches]), axis=0)
+    moving = np.linalg.norm(centred, axis=0) > _ROUNDING * size
+    unit = centred[:, moving] / np.linalg.norm(centred[:, moving], axis=0)
+    values = len(centred) - len(stretches)
+    if unit.shape[1] >= values and np.linalg.matrix_rank(unit, tol=_ROUNDING) >= values:
+        return np.zeros_like(moving)
+    return np.asarray(moving)
+
+
 def _least_squares(stretches: Sequence[tuple[FloatArray, FloatArray, int]]) -> FloatArray:
     """Constants of the columns by ordinary least squares, each stretch about its mean."""
     width = stretches[0][0].shape[1]
@@ -242,8 +258,12 @@ def _least_squares(stretches: Sequence[tuple[FloatArray, FloatArray, int]]) -> F
         centred = x - x.mean(axis=0)
         gram += n / len(x) * centred.T @ centred
         image += n / len(x) * centred.T @ (y[:, 0] - y.mean())
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    return np.asarray(np.linalg.lstsq(gram / np.outer(size, size), image / size, rcond=1e-12)[0] / size)
+    size, found = np.sqrt(np.diag(gram)), np.zeros(width)
+    moving = np.flatnonzero(size)
+    size, image = size[moving], image[moving]
+    unit = gram[np.ix_(moving, moving)] / np.outer(size, size)
+    found[moving] = np.linalg.lstsq(unit, image / size, rcond=1e-12)[0] / size
+    return found
 
 
 def _edges(begin: float, per_octave: int) -> FloatArray:

@@ -85,3 +85,23 @@ def test_a_column_that_lies_in_rows_that_are_not_used_has_no_say() -> None:
         assert len(spectrum.values) > 5
         found.append(SpectrumModel(spectrum, SpectrumTerms(("N", "B", "K")), used=used).fit().coefficients)
     assert found[0] == pytest.approx(found[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("still", [0.0, 1.0, 1.0 + 1e-15 * np.arange(2000)[:, None] % 3e-15])
+def test_columns_that_move_by_rounding_alone_say_nothing(still: float | FloatArray) -> None:
+    """A square of readings that are -1 and 1 alone is such a column, beside two that are alike."""
+    rng = np.random.default_rng(2)
+    values, step = rng.normal(size=2000), np.repeat([-1.0, 1.0], 1000)[:, None]
+    alone = spectrum_of([values], 1.0, [step])
+    beside = spectrum_of([values], 1.0, [np.hstack([step, step + 0.0 * still, 0.0 * step + still])])
+    np.testing.assert_allclose(beside.power, alone.power, rtol=1e-9)
+    assert beside.basis[0].shape == alone.basis[0].shape
+
+
+def test_columns_that_fit_all_values_are_left_out() -> None:
+    """Eight samples beside ten columns: noise is told as without them, not as rounding."""
+    rng = np.random.default_rng(3)
+    values, columns = rng.normal(size=8), rng.normal(size=(8, 10))
+    found, plain = (spectrum_of([values], 1.0, [x]) for x in (columns, np.empty((8, 0))))
+    np.testing.assert_allclose(found.power, plain.power, rtol=1e-12)
+    assert found.basis[0].shape[1] == 0

@@ -1,0 +1,82 @@
+"""Runs that are short, still or coarse are modelled and judged, or refused in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogml.arrays import FloatArray
+from fogml.errors import InputError
+from fogml.models.names import make_model
+from fogml.models.saved import load_model, save_model
+from fogml.runs.facts import Facts
+from fogml.runs.noise_of_run import noise_report
+from fogml.runs.run import Run
+from fogml.validation.judge import judge
+
+FACTS = Facts(unit="U", axis="z", latitude=0.0, input_axis="up")
+
+
+def run_of(gyro: FloatArray, T: FloatArray, sample_s: float, name: str = "run.csv") -> Run:
+    time = sample_s * (np.arange(len(gyro)) + 1.0)
+    return Run(name, {"time": time, "gyro": gyro, "T": T}, FACTS)
+
+
+@pytest.mark.parametrize("name", ["auto", "mixed-effects", "polynomial"])
+@pytest.mark.parametrize("rows", [60, 200])
+def test_a_model_of_a_short_run_is_saved_as_it_can_be_read(name: str, rows: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    T = 25.0 + 20.0 * np.sin(np.arange(rows) * 60.0 / 3000.0)
+    run = run_of(0.02 * T + 0.1 * rng.normal(size=rows), T, 60.0)
+    model = make_model(name).fit([run])
+    save_model(model, tmp_path / "model")
+    again = load_model(tmp_path / "model")
+    np.testing.assert_array_equal(again.predict(run), model.predict(run))
+    assert again.intervals_.averaging_s >= 60.0
+
+
+def test_noise_beside_a_temperature_that_steps_between_two_soaks() -> None:
+    """The square of such a temperature does not move: it told constants of 1e130 once."""
+    rng = np.random.default_rng(1)
+    T = np.repeat([0.0, 50.0], 4500)
+    run = run_of(0.03 * rng.normal(size=9000) + 1e-3 * T, T, 1.0)
+    terms = noise_report(run)["terms"]
+    assert terms["N"]["value"] == pytest.approx(0.03 / 60.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("gyro", "T", "sample_s"),
+    [
+        pytest.param(np.zeros(900), np.linspace(0.0, 50.0, 900), 1.0, id="dead output"),
+        pytest.param(np.full(900, 44.9), np.linspace(0.0, 50.0, 900), 10.0, id="output that stands still"),
+        pytest.param(
+            np.where(np.arange(900) == 300, 1e9, 3.0), np.full(900, 25.0), 10.0, id="one spike in it"
+        ),
+        pytest.param(np.round(np.sin(np.arange(900) / 90.0)), np.full(900, 25.0), 10.0, id="three counts"),
+        pytest.param(
+            np.sin(np.arange(900.0)), np.repeat([0.0, 50.0], 450), 600.0, id="a step at ten minutes a sample"
+        ),
+        pytest.param(np.sin(np.arange(8.0)), np.linspace(0.0, 50.0, 8), 60.0, id="eight samples"),
+    ],
+)
+def test_odd_runs_are_judged_with_figures_that_are_finite(
+    gyro: FloatArray, T: FloatArray, sample_s: float
+) -> None:
+    rng = np.random.default_rng(2)
+    warm = np.concatenate([np.linspace(0.0, 50.0, 450), np.linspace(50.0, 0.0, 450)])
+    train = run_of(0.02 * warm + 0.1 * rng.normal(size=900), warm, sample_s, "train.csv")
+    test = run_of(gyro, T, sample_s, "test.csv")
+    judged = judge(make_model("mean").fit([train]), [train], [test], averaging_s=2.0 * sample_s)
+    found = judged.test[0]
+    assert np.isfinite([found.before.rms, found.after.rms, found.floor]).all()
+
+
+def test_runs_shorter_than_the_windows_are_refused_with_what_to_do() -> None:
+    rng = np.random.default_rng(3)
+    time = 0.01 * (np.arange(900) + 1.0)
+    T = 20.0 + 30.0 * np.sin(np.linspace(0.0, 8.0, 900))
+    columns = {"time": time, "gyro": rng.normal(size=900), "T_in": T, "T_out": T + rng.normal(size=900)}
+    with pytest.raises(InputError, match="give longer runs, or state shorter windows"):
+        make_model("auto").fit([Run("short.csv", columns, FACTS)])
