@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fogml.cli.lab import AcceptanceSettings, BatchSettings
-from fogml.cli.results import tell
-from fogml.cli.runs import open_runs
+from fogml.cli.runs import open_runs, tell
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 

@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 from fogml.cli.lab import WAYS, MisalignmentSettings, NorthSettings, RateSettings
-from fogml.cli.results import tell
-from fogml.cli.runs import open_run
+from fogml.cli.runs import open_run, tell
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError, known_are
 from fogml.lab.misalignment_input import read_measurements

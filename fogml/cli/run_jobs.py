@@ -8,9 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fogml.cli.results import tell
 from fogml.cli.run_commands import ImportSettings, InspectSettings, NoiseSettings
-from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs
+from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs, tell
 from fogml.cli.terminal import Terminal, number, span
 from fogml.errors import InputError
 from fogml.outputs import whole_file, whole_folder

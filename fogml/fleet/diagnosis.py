@@ -22,7 +22,7 @@ from fogml.fleet.shares import (
 )
 from fogml.gap.result import NAMED
 from fogml.gap.settings import Priors
-from fogml.signals.random_effects import random_effects
+from fogml.signals.restricted import random_effects
 from fogml.strict import Strict, strictly
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]

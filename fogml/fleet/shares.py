@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from fogml.arrays import FloatArray
 from fogml.intervals import TAILS
 from fogml.signals.distributions import student_ppf, student_sf
-from fogml.signals.random_effects import random_effects
+from fogml.signals.restricted import random_effects
 
 _DEVIATIONS = np.geomspace(0.03, 10.0, 60)
 # Deviations that are weighed, in units of the one found and of the noise it was seen through together.

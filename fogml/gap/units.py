@@ -24,7 +24,7 @@ from fogml.gap.result import Diagnosis, Estimate
 from fogml.gap.search import Explanation
 from fogml.gap.settings import Priors
 from fogml.runs.run import Run
-from fogml.signals.random_effects import random_effects
+from fogml.signals.restricted import random_effects
 from fogml.twin.twin import Twin
 
 SCHEMA = "fogml.gap_units/1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.signals.random_effects import random_effects
+from fogml.signals.restricted import random_effects
 
 
 def test_they_are_the_line_s():
