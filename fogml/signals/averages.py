@@ -46,13 +46,12 @@ class BlockAverages:
         return len(self.time_s)
 
 
-def block_averages(
-    time: ArrayLike, *columns: ArrayLike, window_s: float, start: float | None = None
-) -> BlockAverages:
+def block_averages(time: ArrayLike, *columns: ArrayLike, window_s: float) -> BlockAverages:
     """Average columns over consecutive windows of `window_s` seconds.
 
-    A gap is an interval longer than 3 median sample intervals. A gap longer than a quarter of
-    the window cuts the series and the windows begin anew after it; a shorter one is spanned.
+    Windows begin at the first sample of each stretch. A gap is an interval longer than 3 median sample
+    intervals. A gap longer than a quarter of the window cuts the series and the windows begin anew after it;
+    a shorter one is spanned.
     A window is kept if its samples cover at least half of it, from the first to the last of
     them plus one sample interval; so the rest at the end of a stretch is dropped if short.
     Takes O(n) time.
@@ -65,10 +64,6 @@ def block_averages(
         Values to average, each of shape (n,) or (n, k).
     window_s
         Length of a window [s].
-    start
-        Time at which the first window begins [s]; samples before it are left out. By default
-        windows begin at the first sample of each stretch. With `start`, the windows of every
-        stretch lie on the one grid ``start + i * window_s``, so that two series share windows.
 
     Returns
     -------
@@ -87,7 +82,7 @@ def block_averages(
     for position, array in enumerate(arrays, start=1):
         if array.shape[:1] != time.shape:
             raise InputError(f"column {position} has {len(array)} samples, time has {len(time)}")
-    starts, stops = _windows(time, float(window_s), start)
+    starts, stops = _windows(time, float(window_s))
     counts = stops - starts
     return BlockAverages(
         time_s=window_means(time, starts, stops),
@@ -98,30 +93,27 @@ def block_averages(
     )
 
 
-def _windows(time: FloatArray, window_s: float, start: float | None) -> tuple[IndexArray, IndexArray]:
+def _windows(time: FloatArray, window_s: float) -> tuple[IndexArray, IndexArray]:
     """First and past-the-last samples of the windows that are at least half full."""
-    none = np.empty(0, dtype=np.intp)
-    first = 0 if start is None else int(np.searchsorted(time, start))
-    kept = time[first:]
-    if len(kept) == 0:
-        return none, none
-    sample_s = Clock(kept).sample_s
-    cuts = gap_starts(kept, sample_s, longest_gap_s(window_s, sample_s))
-    edges = np.concatenate(([0], cuts, [len(kept)]))
+    if len(time) == 0:
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
+    sample_s = Clock(time).sample_s
+    cuts = gap_starts(time, sample_s, longest_gap_s(window_s, sample_s))
+    edges = np.concatenate(([0], cuts, [len(time)]))
     opens = [edges[:-1]]
-    for part in large.pieces(kept, overlap=1):
+    for part in large.pieces(time, overlap=1):
         rows = np.arange(part.start, part.stop)
-        origin = kept[edges[np.searchsorted(edges, rows, side="right") - 1]] if start is None else start
-        number = np.floor((kept[part] - origin + _ROUNDING * sample_s) / window_s)
+        origin = time[edges[np.searchsorted(edges, rows, side="right") - 1]]
+        number = np.floor((time[part] - origin + _ROUNDING * sample_s) / window_s)
         opens.append(part.start + np.flatnonzero(np.diff(number)) + 1)
     starts = np.unique(np.concatenate(opens))
-    stops = np.append(starts[1:], len(kept))
-    covered = kept[stops - 1] - kept[starts] + sample_s
+    stops = np.append(starts[1:], len(time))
+    covered = time[stops - 1] - time[starts] + sample_s
     full = covered >= 0.5 * window_s - _ROUNDING * sample_s
     if sample_s == 0.0:
         # One sample, or all at one time: nothing tells the interval that a sample stands for.
         full = np.ones_like(full)
-    return (starts[full] + first).astype(np.intp), (stops[full] + first).astype(np.intp)
+    return starts[full].astype(np.intp), stops[full].astype(np.intp)
 
 
 def window_means(values: FloatArray, starts: IndexArray, stops: IndexArray) -> FloatArray:

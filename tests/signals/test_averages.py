@@ -66,14 +66,6 @@ def test_long_gap_begins_anew_and_short_gap_is_spanned():
     assert len(block_averages(bursts, bursts, window_s=100.0)) == 6
 
 
-def test_one_grid_for_two_series():
-    slow, fast = np.arange(3.0, 100.0), np.arange(1.0, 100.0, 0.1)
-    one = block_averages(slow, slow, window_s=10.0, start=10.0)
-    two = block_averages(fast, fast, window_s=10.0, start=10.0)
-    np.testing.assert_allclose(one.values[0], np.arange(14.5, 100, 10))
-    np.testing.assert_allclose(two.values[0], np.arange(14.95, 100, 10), atol=1e-9)
-
-
 def test_a_large_offset_costs_no_digits():
     rng = np.random.default_rng(2)
     noise = np.round(rng.normal(size=100_000) * 2**20) / 2**20
