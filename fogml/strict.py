@@ -3,27 +3,14 @@
 from __future__ import annotations
 
 import json
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Any, TypeVar
 
-import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, PlainSerializer, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from fogml.arrays import FloatArray
 from fogml.errors import InputError, quoted
 
 CONTENT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=())
 """Of `Strict`; a dataclass that has it by `pydantic.with_config` is held to it where it is read."""
-
-if TYPE_CHECKING:
-    Vector = FloatArray
-    Matrix = FloatArray
-else:
-    _AS_ARRAY = (AfterValidator(partial(np.array, dtype=np.float64)), PlainSerializer(np.ndarray.tolist))
-    Vector = Annotated[list[float], *_AS_ARRAY]
-    """A field that is a list of numbers in a file, and an array here."""
-    Matrix = Annotated[list[list[float]], *_AS_ARRAY]
-    """A field of lists of numbers in a file."""
 
 
 class Strict(BaseModel):

@@ -17,8 +17,8 @@ from pydantic import with_config
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
-from fogml.models.prior import Prior
-from fogml.strict import CONTENT, Matrix, Vector, as_written, strictly
+from fogml.models.prior import Matrix, Prior, Vector
+from fogml.strict import CONTENT, as_written, strictly
 
 Covariates = Mapping[str, str]
 """Values by name, as a manifest states them: numbers or labels; what is not known is left out."""

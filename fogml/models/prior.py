@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, with_config
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, with_config
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals.distributions import chi2_sf
-from fogml.strict import CONTENT, Matrix, Vector, as_written, strictly
+from fogml.strict import CONTENT, as_written, strictly
 
 _SPREADS = np.logspace(0.0, 8.0, 33)
 # Factors by which a unit's prior covariance may be wider than its fleet's.
@@ -23,6 +24,15 @@ _DRAWS = 10_000
 _TOLD = 0.1
 # Least that rows tell of a direction, against what the fleet tells, for the direction to be checked.
 
+if TYPE_CHECKING:
+    Vector = FloatArray
+    Matrix = FloatArray
+else:
+    _AS_ARRAY = (AfterValidator(partial(np.array, dtype=np.float64)), PlainSerializer(np.ndarray.tolist))
+    Vector = Annotated[list[float], *_AS_ARRAY]
+    """A field that is a list of numbers in a file, and an array here."""
+    Matrix = Annotated[list[list[float]], *_AS_ARRAY]
+    """A field of lists of numbers in a file."""
 _OR_NONE = (
     BeforeValidator(lambda units: float("inf") if units is None else units),
     PlainSerializer(lambda units: units if np.isfinite(units) else None),
