@@ -135,9 +135,11 @@ def left_is_noise(judged: RunJudgement) -> bool:
 
 
 def out_of_reach(
-    index: float, floors: Sequence[float], averages: Sequence[int], averaging_s: float, where: str
+    index: float, floors: Sequence[Floor], averages: Sequence[int], averaging_s: float, where: str
 ) -> str | None:
     """The sentence that no model can meet a design index on some runs; None where one may.
+
+    It is that of the least noise that floors and so many averages allow.
 
     Parameters
     ----------
@@ -153,8 +155,9 @@ def out_of_reach(
     count = int(np.sum(averages))
     if not count:
         return None
-    floor = float(np.sqrt(np.average(np.square(floors), weights=averages)))
-    low, high = floor_interval(floor, count)
+    ends = np.square([(one.lower, one.value, one.upper) for one in floors])
+    least, floor, most = np.sqrt(np.average(ends, axis=0, weights=averages))
+    low, high = floor_interval(least, count)[0], floor_interval(most, count)[1]
     if index >= low:
         return None
     return (

@@ -182,7 +182,7 @@ def _out_of_reach(runs: Sequence[Run], design_index: float, averaging_s: float) 
     for run in runs:
         every = np.ones(len(run), dtype=bool)
         averages.append(len(block_averages(run.time, run.error_deg_h, window_s=averaging_s).values[0]))
-        floors.append(floor_of_run(run, every, run.error_deg_h, averaging_s).value)
+        floors.append(floor_of_run(run, every, run.error_deg_h, averaging_s))
     return out_of_reach(design_index, floors, averages, averaging_s, "the training runs")
 
 

@@ -16,6 +16,7 @@ from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.signals.averages import AVERAGING_S
+from fogml.signals.floor import Floor
 from fogml.validation.floors import check_noise_run, floor_of_run, out_of_reach
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics, check_turn_on_band, repeatability_of
@@ -144,10 +145,14 @@ def _out_of_reach(test: Sequence[RunJudgement], design_index: float | None) -> t
     if design_index is None:
         return ()
     told = [
-        out_of_reach(design_index, [run.floor], [len(run.series.time)], run.averaging_s, run.run)
+        out_of_reach(design_index, [_floor(run)], [len(run.series.time)], run.averaging_s, run.run)
         for run in test
     ]
     return tuple(f"{text}." for text in told if text)
+
+
+def _floor(run: RunJudgement) -> Floor:
+    return Floor(run.floor, *(run.floor_ci90 or (run.floor, run.floor)))
 
 
 def _within(errors: RunErrors, models: Sequence[DriftModel]) -> RunErrors:

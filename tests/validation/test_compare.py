@@ -7,12 +7,14 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from fogml.errors import InputError
 from fogml.models.names import make_model
 from fogml.runs.run import Run
+from fogml.signals.floor import Floor
 from fogml.validation.compare import compare
-from fogml.validation.floors import floor_interval
+from fogml.validation.floors import floor_interval, out_of_reach
 from fogml.validation.index_search import Candidate, candidates, train_until_index
 from fogml.validation.judge import judge
 from tests.validation.known_drift import KnownDrift
@@ -158,6 +160,15 @@ def test_an_index_out_of_reach_takes_the_nearest(runs):
     assert len(found.trials) == len(candidates("polynomial", "T"))
     assert found.chosen.rms == min(trial.rms for trial in found.trials)
     assert "none meets" in found.summary()
+
+
+def test_an_index_is_out_of_reach_only_below_the_least_noise_that_the_floor_allows():
+    floor, count = Floor(3.0e-3, 1.6e-3, 5.0e-3), 24
+    least = 1.6e-3 * np.sqrt(chi2.ppf(0.05, count) / count)
+    most = 5.0e-3 * np.sqrt(chi2.ppf(0.95, count) / count)
+    assert out_of_reach(1.001 * least, [floor], [count], 600.0, "a.csv") is None
+    told = out_of_reach(0.999 * least, [floor], [count], 600.0, "a.csv")
+    assert f"leaves 0.003 deg/h rms ({least:.3g} to {most:.3g}, 90%)" in told
 
 
 def test_an_index_below_the_floor_is_said_at_once(runs):
