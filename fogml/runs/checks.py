@@ -21,6 +21,10 @@ STUCK_S = 600.0
 """A sensor that shows one value for longer [s] may be stuck."""
 MOVED_DEGC = 0.5
 """What another sensor must have moved by meanwhile [degC], at least."""
+FROZEN_SAMPLES = 60
+"""Samples of one value, one after the other, from which on a noisy output may be frozen."""
+FROZEN_RATIO = 10
+"""How many times longer that is than any other value stays, those that are frozen apart."""
 SATURATED_SAMPLES = 3
 """Samples at an extreme, one after the other, from which on the output may saturate."""
 SATURATED_IN_ALL = 10
@@ -49,7 +53,8 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         More than 1 % of the other intervals are off the median by more than a tenth.
     ``stuck_sensor``
         A temperature holds one value for over 10 min while another moves by more than 0.5 degC
-        and more than twice the sensor's resolution; or the gyro does, whose samples else differ.
+        and more than twice the sensor's resolution; or the gyro does, whose samples else differ,
+        or holds one for 60 samples and ten times as long as it does else, no table turning.
     ``saturation``
         The gyro stays at its greatest or least value for 3 samples on end, or is there in 10 in
         all, and over 3 times more often than at the value next to it, so that noise is cut off
@@ -146,6 +151,34 @@ def _stuck(run: Run) -> Iterator[Finding]:
             )
             count = int((stops - starts)[found].sum())
             yield Finding("stuck_sensor", message, column=name, row=first + 1, count=count)
+            if name == "gyro":
+                return
+    yield from _frozen(run)
+
+
+def _frozen(run: Run) -> Iterator[Finding]:
+    """Spells of the gyro that a noisy output makes by no chance, however short or steady the run."""
+    gyro, half = run.gyro, FROZEN_SAMPLES // 2
+    if "rate" in run.columns and np.ptp(run.columns["rate"]) > 0.0:
+        return  # coarse counts rest at one value while the table stands
+    same = gyro[1:] == gyro[:-1]
+    if len(same) < FROZEN_SAMPLES or not same[: len(same) // half * half].reshape(-1, half).all(axis=1).any():
+        return
+    true = np.flatnonzero(same)
+    edges = np.flatnonzero(np.diff(true) > 1)
+    lengths = np.diff(edges, prepend=-1, append=len(true) - 1) + 1
+    ordinary = int(np.max(lengths, where=lengths < FROZEN_SAMPLES, initial=1))
+    found = np.flatnonzero(lengths >= max(FROZEN_SAMPLES, FROZEN_RATIO * ordinary))
+    count = int(lengths[found].sum())
+    others = len(same) - len(true) + 1 - len(found)
+    if len(found) and others >= _LEAST_SPELLS and len(gyro) - count <= _NOISY_SPELL * others:
+        first = int(true[np.concatenate(([0], edges + 1))[found[0]]])
+        spells = "" if len(found) == 1 else f", and {len(found) - 1} times more"
+        message = (
+            f"'gyro' stays at {gyro[first]:.6g} for {lengths[found[0]]} samples from {run.time[first]:.10g} "
+            f"s on{spells}, where else no value lasts longer than {ordinary}; the output may be stuck"
+        )
+        yield Finding("stuck_sensor", message, column="gyro", row=first + 1, count=count)
 
 
 def _marks(time: FloatArray) -> IndexArray | None:

@@ -292,6 +292,26 @@ class TestStuckSensors:
         columns["gyro"][3000:12_000] = columns["gyro"][3000]
         assert one(columns, "stuck_sensor").column == "gyro"
 
+    @pytest.mark.parametrize("spells", [((5000, 5100),), ((5000, 5100), (9000, 19_500))])
+    @pytest.mark.parametrize("counted", [False, True])
+    def test_the_gyro_for_a_short_time_or_at_a_steady_temperature(self, spells, counted):
+        columns = noisy()
+        columns["T_in"], columns["T_out"] = np.full((2, 20_000), 25.0)
+        if counted:  # in counts a value stays for some samples by chance
+            columns["gyro"] = np.floor(4.0 * columns["gyro"] / np.std(columns["gyro"]))
+        sound = codes(columns)
+        for start, stop in spells:
+            columns["gyro"][start:stop] = 0.25
+        (finding,) = [f for f in check_run(Run("run", columns)) if f.code == "stuck_sensor"]
+        assert "stuck_sensor" not in sound
+        assert (finding.row, finding.count) == (5001, sum(stop - start for start, stop in spells))
+
+    def test_counts_at_rest_beside_turns_are_no_fault(self):
+        columns = noisy()
+        columns["rate"] = turning(20_000, 0.1)
+        columns["gyro"] = np.round(columns["gyro"] * (columns["rate"] != 0.0) + 3600.0 * columns["rate"])
+        assert "stuck_sensor" not in codes(columns)
+
     def test_a_sensor_dead_all_along(self):
         columns = noisy()
         columns["T_case"] = np.zeros(20_000)
