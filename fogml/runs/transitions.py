@@ -10,7 +10,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.runs.turning import LEAST_RATE_DEG_S, white_noise
+from fogml.runs.turning import least_rate_deg_s, white_noise
 
 LEAST_ROWS = 4
 """Rows that tell a mean and a line."""
@@ -127,7 +127,6 @@ LONGEST_TRANSITION_S = 60.0
 _LAG_S = 1.0
 _PLATEAU_S = 3.0
 _RATE_NOISES, _GYRO_NOISES = 8.0, 20.0
-_SETTLED_SHARE = 0.02
 
 
 @dataclass(frozen=True)
@@ -148,17 +147,18 @@ def find_transitions(run: Run) -> IndexArray:
     return _changes(run).start
 
 
-def time_to_rate_s(run: Run) -> float:
+def time_to_rate_s(run: Run, settled_share: float = 0.02, noises: float = 6.0) -> float:
     """The longest time the table takes to reach its rate [s]; 0 if it never changes.
 
     Where the recorded rate steps at once it is a command, and the gyro tells the time: until it
-    stays within 2 % of the step, or its own noise, about the new plateau.
+    stays within `settled_share` of the step, or so many standard deviations of its noise, about the new
+    plateau. A step of less than twice that noise tells nothing.
     """
     changes = _changes(run)
     if len(changes.start) == 0:
         return 0.0
     longest = float((run.time[changes.stop] - run.time[changes.start]).max())
-    return max(longest, _gyro_settling_s(run, changes))
+    return max(longest, _gyro_settling_s(run, changes, settled_share, noises))
 
 
 def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
@@ -214,7 +214,7 @@ def _find(run: Run) -> _Changes:
     if len(run) < 3:
         return _Changes(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp))
     if "rate" in run.columns:
-        least = max(LEAST_RATE_DEG_S, _RATE_NOISES * white_noise(run.rate))
+        least = least_rate_deg_s(run, _RATE_NOISES)
         return _level_changes(run, run.rate, least)
     gyro = _gyro_deg_s(run)
     if gyro is None:
@@ -271,7 +271,7 @@ def _median_of_three(values: FloatArray) -> FloatArray:
     return np.concatenate([values[:1], inner, values[-1:]])
 
 
-def _gyro_settling_s(run: Run, changes: _Changes) -> float:
+def _gyro_settling_s(run: Run, changes: _Changes, settled_share: float, noises: float) -> float:
     """The longest time the gyro takes to settle on its new plateau after a change [s]."""
     clean = _median_of_three(run.gyro)
     noise = white_noise(clean)
@@ -284,9 +284,9 @@ def _gyro_settling_s(run: Run, changes: _Changes) -> float:
             continue
         old = float(np.median(clean[before:start][-len(plateau) :]))
         new = float(np.median(plateau[len(plateau) // 2 :]))
-        away = np.abs(plateau - new) > max(_SETTLED_SHARE * abs(new - old), 6.0 * noise)
+        away = np.abs(plateau - new) > max(settled_share * abs(new - old), noises * noise)
         # A plateau that does not hold still in its second half tells no settling time.
-        if abs(new - old) > 12.0 * noise and away.any() and not away[len(plateau) // 2 :].any():
+        if abs(new - old) > 2.0 * noises * noise and away.any() and not away[len(plateau) // 2 :].any():
             last = start + int(np.flatnonzero(away)[-1])
             longest = max(longest, float(run.time[last] - run.time[start]))
     return longest

@@ -33,6 +33,6 @@ def turning(run: Run) -> BoolArray:
     return large.each(lambda rate: np.abs(rate) > least, run.rate, kind=bool)
 
 
-def least_rate_deg_s(run: Run) -> float:
-    """The least table rate that is not rest [deg/s]: `LEAST_RATE_DEG_S`, or six times its own noise."""
-    return max(LEAST_RATE_DEG_S, 6.0 * white_noise(run.rate))
+def least_rate_deg_s(run: Run, noises: float = 6.0) -> float:
+    """The least table rate that is not rest [deg/s]: `LEAST_RATE_DEG_S`, or so many times its own noise."""
+    return max(LEAST_RATE_DEG_S, noises * white_noise(run.rate))
