@@ -26,7 +26,7 @@ def test_rows_are_those_whose_windows_count(run):
     _, full, _ = features.atom_values(run)
     np.testing.assert_array_equal(table.X, features.transform(run)[full])
     np.testing.assert_array_equal(table.y, run.error_deg_h[full])
-    assert len(table) == len(run) - 16 and table.averaging_s == 0.0
+    assert len(table) == len(run) - 16 and table.averaging_s == run.sample_s
 
 
 def test_averages_are_means_of_composed_rows(run):
