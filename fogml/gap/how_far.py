@@ -144,7 +144,8 @@ class HeldOut:
         expected = expected_mean_square(model, windows.time, windows.window_s, fitted=fitted)
         count = self._settings.noises
         drawn = mean_square_draws(model, windows.time, windows.window_s, count, self._rng, fitted=fitted)
-        return np.asarray(drawn / drawn.mean() * expected)
+        # One window about its own mean leaves nothing.
+        return np.asarray(drawn / (float(drawn.mean()) or 1.0) * expected)
 
     def how_far(self, after: Foretold) -> HowFar:
         """Before, recalibrated, after and floor, and what is closed.

@@ -15,10 +15,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import log_ndtr
 
 from fogml.arrays import FloatArray
+
+
+def prior_factor(gram: FloatArray) -> FloatArray:
+    """Lower Cholesky factor of I + G, of inner products G of columns of unit priors, shape (k, k).
+
+    Where columns are so great that the rounding of G exceeds the prior's I, that rounding is added.
+    """
+    inner = np.eye(len(gram)) + 0.5 * (gram + gram.T)
+    try:
+        return np.asarray(np.linalg.cholesky(inner))
+    except np.linalg.LinAlgError:
+        rounding = np.finfo(np.float64).eps * len(gram) * float(np.trace(inner))
+        return np.asarray(np.linalg.cholesky(inner + rounding * np.eye(len(gram))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +61,7 @@ class LinearGaussian:
         """With a block of columns of prior standard deviation `size` more, shape (n, k)."""
         left = size * (columns - self.basis @ (self.basis.T @ columns))
         gram = size * (columns.T @ left)
-        factor = np.linalg.cholesky(np.eye(gram.shape[0]) + 0.5 * (gram + gram.T))
+        factor = prior_factor(gram)
         more = solve_triangular(factor, left.T, lower=True).T
         log_det = self.half_log_det + float(np.log(np.diagonal(factor)).sum())
         return LinearGaussian(self.data, np.concatenate([self.basis, more], axis=1), log_det)
@@ -131,7 +144,7 @@ def wide_gains(
     if across.shape[1] >= len(values):
         gram = np.diag(values) - across @ across.T
         for size in sizes.tolist():
-            factor = np.linalg.cholesky(np.eye(len(gram)) + size**2 * gram)
+            factor = prior_factor(size**2 * gram)
             more = solve_triangular(factor, size * along, lower=True, check_finite=False)
             found.append(float(0.5 * more @ more - np.log(np.diagonal(factor)).sum()))
         return np.array(found)
@@ -164,14 +177,14 @@ class Posterior:
     @classmethod
     def of(cls, design: FloatArray, data: FloatArray) -> Posterior:
         """Of a whitened design, prior standard deviations multiplied in, shape (n, q)."""
-        factor = cho_factor(np.eye(design.shape[1]) + design.T @ design, lower=True)
-        covariance = cho_solve(factor, np.eye(design.shape[1]))
+        factor = prior_factor(design.T @ design)
+        covariance = cho_solve((factor, True), np.eye(design.shape[1]))
         return cls(covariance @ (design.T @ data), covariance)
 
 
 def log_evidence(gram: FloatArray, fits: FloatArray, square: float) -> float:
     """Log evidence from a design's inner products (q, q), with the data (q,), and the data's square."""
-    factor = np.linalg.cholesky(np.eye(len(gram)) + gram)
+    factor = prior_factor(gram)
     along = solve_triangular(factor, fits, lower=True)
     return float(-0.5 * (square - along @ along) - np.log(np.diagonal(factor)).sum())
 

@@ -11,7 +11,7 @@ from scipy.linalg import solve_triangular
 
 from fogml.arrays import FloatArray
 from fogml.gap.field import Blocks, Field, Member
-from fogml.gap.linear_gaussian import log_sum_exp
+from fogml.gap.linear_gaussian import log_sum_exp, prior_factor
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ class Search:
         )
         rows = [self._row(m.node) for m in members]
         gram = np.concatenate([row[:, at] for row in rows] or [np.empty((0, 0))]) * np.outer(size, size)
-        factor = np.linalg.cholesky(np.eye(len(at)) + 0.5 * (gram + gram.T))
+        factor = prior_factor(gram)
         along = solve_triangular(factor, size * self._fits[at], lower=True) if members else np.empty(0)
         gained = 0.5 * float(along @ along) - float(np.log(np.diagonal(factor)).sum())
         return _Held(rows, size, factor, along, self.field.base.log_evidence + gained)

@@ -107,7 +107,8 @@ def standard_errors(columns: FloatArray, covariance: FloatArray, noise: float) -
     """
     if len(covariance) > columns.shape[1]:
         columns = np.column_stack([np.ones(len(columns)), columns])
-    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", columns, covariance, columns) + noise))
+    squares = np.einsum("ij,jk,ik->i", columns, covariance, columns)
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0) + noise))
 
 
 def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[str, Fold]]:

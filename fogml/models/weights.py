@@ -202,7 +202,8 @@ def _lefts(parts: Sequence[LeftOut], weights: FloatArray, kind: str, errors: Flo
     for part in parts:
         if part.kind == kind:
             left = np.abs(part.told - part.predicted @ weights)
-            if weights.any():
-                left /= np.maximum((part.errors @ weights) / (errors[part.fold[1]] @ weights), 1.0)
+            apart, all_told = part.errors @ weights, errors[part.fold[1]] @ weights
+            wider = apart > all_told
+            left[wider] *= all_told[wider] / apart[wider]
             found.append(left)
     return found

@@ -85,7 +85,8 @@ def floor_square(model: NoiseModel, time: ArrayLike, averaging_s: ArrayLike) -> 
     The expected variance of the averages about their mean; parameters as in `expected_mean_square`.
     """
     ones = np.ones((len(np.asarray(time)), 1))
-    return expected_mean_square(model, time, averaging_s, fitted=Fitted(ones, ordinary=True))
+    # Of one average it is nothing but rounding.
+    return max(expected_mean_square(model, time, averaging_s, fitted=Fitted(ones, ordinary=True)), 0.0)
 
 
 def mean_square_draws(

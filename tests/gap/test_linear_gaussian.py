@@ -9,6 +9,7 @@ from fogml.gap.linear_gaussian import (
     Posterior,
     left_out_log_density,
     log_evidence,
+    prior_factor,
     sign_gains,
     size_gains,
     wide_gains,
@@ -101,3 +102,19 @@ def test_the_posterior_is_that_of_the_joint_density():
     np.testing.assert_allclose(found.covariance, np.eye(3) - gain @ fixed, atol=1e-10)
     alone = log_evidence(fixed.T @ fixed, fixed.T @ data, float(data @ data))
     assert alone == pytest.approx(_dense(data, fixed), abs=1e-9)
+
+
+def test_columns_far_greater_than_the_noise_have_a_factor() -> None:
+    """As of a temperature that jumps by 50 degC in a sample: products round by more than the prior."""
+    rng = np.random.default_rng(4)
+    columns = 1e12 * rng.normal(size=(60, 5)) @ rng.normal(size=(5, 40))
+    gram = columns.T @ columns
+    factor = prior_factor(gram)
+    assert np.linalg.norm(factor @ factor.T - gram) < 1e-12 * np.linalg.norm(gram)
+    small = 1e-3 * rng.normal(size=(60, 40))
+    np.testing.assert_allclose(
+        prior_factor(small.T @ small),
+        np.linalg.cholesky(np.eye(40) + small.T @ small),
+        rtol=1e-12,
+        atol=1e-15,
+    )

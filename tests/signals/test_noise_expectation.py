@@ -5,7 +5,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.signals.averages import block_averages
-from fogml.signals.noise_expectation import Fitted, expected_mean_square, mean_square_draws
+from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
 
@@ -69,3 +69,11 @@ def test_bad_input_is_refused():
         expected_mean_square(MODEL, TIME, 100.0, fitted=Fitted(np.ones(3)))
     with pytest.raises(InputError, match="deviations"):
         expected_mean_square(MODEL, TIME, 100.0, fitted=Fitted(COLUMNS, (1.0, -1.0, 1.0)))
+
+
+@pytest.mark.parametrize("window_s", [100.0, 333.0])
+def test_one_average_about_its_own_mean_leaves_nothing(window_s: float) -> None:
+    for seed in range(20):
+        n, b, k = np.random.default_rng(seed).uniform(0.0, 1.0, 3)
+        found = floor_square(NoiseModel(n, b, k), np.array([window_s]), window_s)
+        assert 0.0 <= found < 1e-12
