@@ -200,7 +200,8 @@ class DriftError:
         if not self.seen:
             return ()
         first = float(np.degrees(np.arctan2(self.sine, self.cosine)))
-        away = float(np.degrees(np.arccos(-min(self.size / self.horizontal, 1.0))))
+        share = self.size / self.horizontal if self.size < self.horizontal else 1.0
+        away = float(np.degrees(np.arccos(-share)))
         return tuple(sorted(((first - away) % 360.0, (first + away) % 360.0)))
 
     @property

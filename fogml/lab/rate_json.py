@@ -133,6 +133,11 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
         gains += [gain_of(run, wave) for wave in waves]
         plateaus = find_plateaus(run, waves, settle_s)
         if len(plateaus) > 1:
+            if not np.ptp(plateaus.output) > 0.0:
+                raise InputError(
+                    f"{run.name}: the column 'gyro' stays at one value over all rates of the table, so it "
+                    "has no scale factor; is the gyro connected?"
+                )
             ladders.append((run, plateaus))
             found = slew(run, plateaus)
             # The run with the closest samples tells it best.

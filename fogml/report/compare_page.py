@@ -188,7 +188,7 @@ def rms_bars(judgements: Mapping[str, Judgement], order: Sequence[str]) -> Drawi
     figure.add_vline(x=floor, line=style.FLOOR_LINE)
     figure.add_trace(style.floor_in_legend())
     # Bars have no zero on a logarithmic axis: they begin at a round number below everything.
-    least = min(floor, min(v for v in (*worst, *stability) if v > 0))
+    least = min((v for v in (floor, *worst, *stability) if v > 0), default=1.0)
     figure.update_xaxes(
         title_text="left on the worst test run [deg/h], logarithmic",
         **log_axis(0.5 * least, 1.3 * max(worst)),

@@ -47,7 +47,7 @@ def distribution(fleet: Mapping[str, Any]) -> Drawing:
     every = [unit[key] for unit in judged for key in ("before", "after")] + [floor]
     figure.update_xaxes(
         title_text="rms on the worst test run [deg/h], logarithmic",
-        **log_axis(min(v for v in every if v > 0), max(every)),
+        **log_axis(*every),
     )
     figure.update_yaxes(title_text="units at or below [%]", range=[0, 100])
     style.styled(figure, 360)
@@ -88,8 +88,8 @@ def by_unit(fleet: Mapping[str, Any], order: Sequence[Mapping[str, Any]], outlie
             name="unlike the others",
             marker=style.ring(17),
         )
-    every = [v for unit in units for v in (unit["before"], unit["after"], unit["floor"]) if v and v > 0]
-    figure.update_yaxes(title_text="rms [deg/h], logarithmic", **log_axis(min(every), max(every)))
+    every = [v for unit in units for v in (unit["before"], unit["after"], unit["floor"]) if v]
+    figure.update_yaxes(title_text="rms [deg/h], logarithmic", **log_axis(*every))
     serial_axis(figure, labels)
     style.styled(figure, 400)
     return Drawing(

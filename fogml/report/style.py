@@ -163,13 +163,14 @@ def rounded_up(value: float) -> float:
     return float(f"{next(s for s in steps if s >= value * (1 - 1e-9)):.6g}")
 
 
-def log_axis(low: float, high: float, room: float = 0.06) -> dict[str, Any]:
-    """Settings of a logarithmic axis from ``low`` to ``high``, both positive.
+def log_axis(*values: float, room: float = 0.06) -> dict[str, Any]:
+    """Settings of a logarithmic axis that holds all positive values.
 
     Ticks are plain round numbers, as few as tell the scale: powers of ten, or 1, 2 and 5 times
     these, or finer. ``room`` is left on either side, as a share of the axis.
     """
-    ends = math.log10(low), math.log10(high)
+    positive = [value for value in values if value > 0.0] or [1.0]
+    ends = math.log10(min(positive)), math.log10(max(positive))
     margin = room * max(ends[1] - ends[0], 0.5)
     start, stop = ends[0] - margin, ends[1] + margin
     for multiples in _MULTIPLES:

@@ -103,7 +103,9 @@ def headline_tiles(judgement: Judgement) -> list[Tile]:
     over = averages(worst.averaging_s)
     on = f"{worst.run}, {over}" if len(judgement.test) > 1 else over
     ratio = worst.before.rms / worst.after.rms if worst.after.rms > 0 else float("inf")
-    gain = f"{number(ratio, 2)} × smaller" if ratio >= 1 else f"{number(1 / ratio, 2)} × larger"
+    gain = (
+        f"{number(ratio, 2)} × smaller" if ratio >= 1 else f"{number(1 / ratio, 2)} × larger" if ratio else ""
+    )
     tiles = [
         Tile("Rms before", number(worst.before.rms), "deg/h", on),
         Tile("Rms after", number(worst.after.rms), "deg/h", gain, "" if improves(worst) else "missed"),

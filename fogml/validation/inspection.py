@@ -53,16 +53,20 @@ def _column(run: Run, name: str, values: FloatArray) -> dict[str, Any]:
     large.release()
     spec = column_spec(name)
     unit = run.gyro_unit if name == "gyro" else spec.internal if spec else None
+    finite = np.isfinite(values)
+    # Columns of which nothing is computed may hold infinite or missing values.
+    told = finite.any()
+    values = values if finite.all() or not told else values[finite]
     return {
         "name": name,
         "unit": unit,
         "meaning": spec.meaning
         if spec
         else "not a column of the run format; features that name it alone use it",
-        "least": float(values.min()),
-        "greatest": float(values.max()),
-        "mean": _mean(values),
-        "standard_deviation": large.standard_deviation(values),
+        "least": float(values.min()) if told else None,
+        "greatest": float(values.max()) if told else None,
+        "mean": _mean(values) if told else None,
+        "standard_deviation": large.standard_deviation(values) if told else None,
     }
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
-from fogml.lab.north import PALINDROME, Drift, Scheme, drift_error, horizontal_rate
+from fogml.lab.north import PALINDROME, Drift, DriftError, Scheme, drift_error, horizontal_rate
 from fogml.lab.north_positions import north_from_positions
 from fogml.lab.north_schemes import (
     CoarseFine,
@@ -226,3 +226,9 @@ def test_faulty_positions_are_named(change, message: str) -> None:
 def test_bad_settings_are_refused(make, message: str) -> None:
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_a_drift_without_any_earth_rate_is_worst_where_it_points() -> None:
+    found = DriftError(1.0, 0.0, 0.0)
+    assert found.greatest == 180.0 and found.worst_deg == (180.0, 180.0)
+    assert found.worst_deg == pytest.approx(DriftError(1.0, 0.0, 1e-9).worst_deg)

@@ -197,3 +197,9 @@ def test_facts_of_the_unit_follow_from_its_coil() -> None:
     assert facts["proper_frequency_khz"] == pytest.approx(500.0 / facts["transit_us"])
     # As the catalogue has it for the reference coil, 20 uW and a depth of pi / 2.
     assert unit_facts(Twin())["photon_walk_deg_sqrt_h"] == pytest.approx(1.89e-3, abs=5e-6)
+
+
+def test_an_output_that_does_not_move_with_the_table_is_refused() -> None:
+    run = by_hand(np.array([0.0, 10.0, -10.0, 20.0, -20.0]))
+    with pytest.raises(InputError, match="table: the column 'gyro' stays at one value over all rates"):
+        rate_json([run.with_columns(gyro=np.full(len(run), 3.0))], source="table")

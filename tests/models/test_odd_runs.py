@@ -11,9 +11,12 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
+from fogml.report.compare_page import compare_page
+from fogml.report.train_page import train_page
 from fogml.runs.facts import Facts
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
+from fogml.validation.inspection import inspection_json
 from fogml.validation.judge import judge
 
 FACTS = Facts(unit="U", axis="z", latitude=0.0, input_axis="up")
@@ -71,6 +74,18 @@ def test_odd_runs_are_judged_with_figures_that_are_finite(
     judged = judge(make_model("mean").fit([train]), [train], [test], averaging_s=2.0 * sample_s)
     found = judged.test[0]
     assert np.isfinite([found.before.rms, found.after.rms, found.floor]).all()
+    assert "Rms before" in train_page(judged) and "test.csv" in compare_page({"mean": judged})
+
+
+def test_columns_that_nothing_is_computed_of_may_hold_infinite_values() -> None:
+    rng = np.random.default_rng(4)
+    power = 300.0 + rng.normal(size=100)
+    power[[7, 30]] = np.inf, np.nan
+    columns = {"time": np.arange(1.0, 101.0), "gyro": rng.normal(size=100), "optical_power": power}
+    told = inspection_json([Run("run.csv", columns, FACTS)])["runs"][0]["columns"][2]
+    finite = power[np.isfinite(power)]
+    assert (told["least"], told["greatest"]) == (finite.min(), finite.max())
+    assert (told["mean"], told["standard_deviation"]) == pytest.approx((finite.mean(), finite.std()))
 
 
 def test_runs_shorter_than_the_windows_are_refused_with_what_to_do() -> None:

@@ -76,6 +76,11 @@ def test_a_log_axis_holds_its_values_and_has_ticks_within(low: float, factor: fl
     assert len(axis["tickvals"]) == len(axis["ticktext"]) >= 1
 
 
+def test_a_log_axis_is_that_of_its_positive_values() -> None:
+    assert log_axis(0.0, 2.0, 0.5, -1.0) == log_axis(0.5, 2.0)
+    assert log_axis(0.0) == log_axis(1.0)
+
+
 def test_log_ticks_read_as_plain_numbers() -> None:
     assert log_axis(0.01, 0.5)["ticktext"] == ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5"]
     assert log_axis(1.0, 1e6, room=0.0)["ticktext"][-2:] == ["10<sup>5</sup>", "10<sup>6</sup>"]
