@@ -174,20 +174,20 @@ def log_axis(*values: float, room: float = 0.06) -> dict[str, Any]:
     margin = room * max(ends[1] - ends[0], 0.5)
     start, stop = ends[0] - margin, ends[1] + margin
     for multiples in _MULTIPLES:
-        values = [
+        ticks = [
             float(f"{m}e{power}")
             for power in range(math.floor(start), math.ceil(stop) + 1)
             for m in multiples
             if start <= math.log10(m) + power <= stop
         ]
-        if len(values) >= _LEAST_TICKS:
+        if len(ticks) >= _LEAST_TICKS:
             break
     return {
         "type": "log",
         "range": [start, stop],
         "tickmode": "array",
-        "tickvals": values,
-        "ticktext": [_plain(value) for value in values],
+        "tickvals": ticks,
+        "ticktext": [_plain(value) for value in ticks],
         "minor": {"showgrid": multiples == (1,), "gridcolor": "#F1F3F5", "dtick": "D1"},
     }
 
