@@ -24,14 +24,19 @@ from fogml.arrays import FloatArray
 def prior_factor(gram: FloatArray) -> FloatArray:
     """Lower Cholesky factor of I + G, of inner products G of columns of unit priors, shape (k, k).
 
-    Where columns are so great that the rounding of G exceeds the prior's I, that rounding is added.
+    Where columns are so great that rounding of G exceeds the prior's I, values under 1 are taken for 1.
     """
-    inner = np.eye(len(gram)) + 0.5 * (gram + gram.T)
+    return _factor(np.eye(len(gram)) + 0.5 * (gram + gram.T), 1.0)
+
+
+def _factor(matrix: FloatArray, least: float) -> FloatArray:
+    """Lower Cholesky factor of a matrix whose eigenvalues are `least` or more but for rounding."""
     try:
-        return np.asarray(np.linalg.cholesky(inner))
+        return np.asarray(np.linalg.cholesky(matrix))
     except np.linalg.LinAlgError:
-        rounding = np.finfo(np.float64).eps * len(gram) * float(np.trace(inner))
-        return np.asarray(np.linalg.cholesky(inner + rounding * np.eye(len(gram))))
+        values, vectors = np.linalg.eigh(matrix)
+        upper = np.linalg.qr(np.sqrt(np.maximum(values, least))[:, None] * vectors.T, mode="r")
+        return np.asarray((upper * np.sign(np.diagonal(upper))[:, None]).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +101,7 @@ def size_gains(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatAr
     square = sizes**2
     if gram.shape[-1] == 2:
         # By the determinant, far faster than eigenvectors.
-        a, b, d = gram[..., 0, 0], gram[..., 0, 1], gram[..., 1, 1]
+        a, b, d = np.maximum(gram[..., 0, 0], 0.0), gram[..., 0, 1], np.maximum(gram[..., 1, 1], 0.0)
         f, g = fits[..., 0], fits[..., 1]
         area = np.maximum(a * d - b * b, 0.0)[..., None]
         both = np.asarray(f * f + g * g)[..., None]
@@ -154,7 +159,7 @@ def wide_gains(
         gained = 0.5 * float(np.sum(posterior * along**2 - np.log(scaled)))
         if across.shape[1]:
             weighed = posterior[:, None] * across
-            factor = np.linalg.cholesky(np.eye(across.shape[1]) - across.T @ weighed)
+            factor = _factor(np.eye(across.shape[1]) - across.T @ weighed, float(np.finfo(np.float64).eps))
             more = solve_triangular(factor, weighed.T @ along, lower=True, check_finite=False)
             gained += float(0.5 * more @ more - np.log(np.diagonal(factor)).sum())
         found.append(gained)

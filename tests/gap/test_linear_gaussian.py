@@ -111,6 +111,10 @@ def test_columns_far_greater_than_the_noise_have_a_factor() -> None:
     gram = columns.T @ columns
     factor = prior_factor(gram)
     assert np.linalg.norm(factor @ factor.T - gram) < 1e-12 * np.linalg.norm(gram)
+    assert np.all(np.triu(factor, 1) == 0.0) and np.all(np.diagonal(factor) > 0.0)
+    # What is left of columns beside others may be negative by far more than its own rounding.
+    below = np.diag([1e6, -1e3, 2.0])
+    np.testing.assert_allclose(np.diagonal(prior_factor(below)) ** 2, [1e6 + 1.0, 1.0, 3.0], rtol=1e-12)
     small = 1e-3 * rng.normal(size=(60, 40))
     np.testing.assert_allclose(
         prior_factor(small.T @ small),
@@ -118,3 +122,9 @@ def test_columns_far_greater_than_the_noise_have_a_factor() -> None:
         rtol=1e-12,
         atol=1e-15,
     )
+
+
+def test_blocks_that_nothing_is_left_of_gain_nothing_at_any_size() -> None:
+    gram, fits = np.diag([-1e-9, -1e-9]), np.zeros(2)
+    np.testing.assert_allclose(size_gains(gram, fits, np.array([1.0, 1e6])), 0.0, atol=1e-12)
+    np.testing.assert_allclose(size_gains(gram[:1, :1], fits[:1], np.array([1.0, 1e6])), 0.0, atol=1e-12)
