@@ -1,7 +1,7 @@
 r"""Several linear descriptions of one drift, fitted without parts of the training runs, and combined.
 
-Left out in turn are whole runs, halves of each run, either direction of temperature, and shorter blocks of
-time; `fogml.models.weights` weighs what members predict of them.
+Left out in turn are whole runs; of one run its halves, either direction of temperature, and shorter blocks of
+time. `fogml.models.weights` weighs what members predict of them.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def standard_errors(columns: FloatArray, covariance: FloatArray, noise: float) -
 
 
 def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[str, Fold]]:
-    """Parts to leave out: whole runs, halves of each run, either direction of temperature, blocks of time."""
+    """Parts to leave out: whole runs; of one run halves, either direction of temperature, blocks of time."""
     runs = [np.flatnonzero(table.run_index == run) for run in np.unique(table.run_index)]
     rising = np.zeros(len(table), dtype=np.bool_)
     for rows in runs:
@@ -130,7 +130,9 @@ def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[
     ]
     if len(table) >= BLOCKS * LEAST_ROWS:
         parts += [("blocks", fold) for fold in time_folds(table, BLOCKS, blocks_per_fold=2)]
-    return [(kind, fold) for kind, fold in parts if min(len(rows) for rows in fold) >= LEAST_ROWS]
+    told = [(kind, fold) for kind, fold in parts if min(len(rows) for rows in fold) >= LEAST_ROWS]
+    # Where runs can be left out nothing is asked of parts of them.
+    return [part for part in told if part[0] == "runs"] or told
 
 
 def left_out(
