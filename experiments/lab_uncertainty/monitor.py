@@ -19,14 +19,15 @@ LIMIT, RUNS = 300.0, 40
 class Months:
     """Runs of a unit: what moves its figure between them, and what changes with run `onset`.
 
-    Deviations between runs: white, flicker, a walk, and the tails of a Student's t with `freedom`, 0 for
-    normal ones; each run tells its figure with an error of the deviation `error`, stated right. The change is
-    a step or, per run, a ramp, of the given size either way.
+    Deviations between runs: white, flicker, a walk, a season (amplitude, 52 runs a year), and the tails of a
+    Student's t with `freedom`, 0 for normal ones; each run tells its figure with an error of the deviation
+    `error`, stated right. The change is a step or, per run, a ramp, of the given size either way.
     """
 
     white: float = 1.0
     flicker: float = 0.0
     walk: float = 0.0
+    season: float = 0.0
     freedom: int = 0
     error: float = 0.5
     shape: str = ""
@@ -39,6 +40,8 @@ CASES = {
     "nothing changes, flicker": Months(flicker=1.0),
     "nothing changes, tails": Months(freedom=3),
     "nothing changes, random walk": Months(walk=0.1),
+    "nothing changes, season of amplitude 1": Months(season=1.0),
+    "nothing changes, season of amplitude 3": Months(season=3.0),
     "step of 3": Months(shape="step", size=3.0),
     "step of 6": Months(shape="step", size=6.0),
     "step of 12": Months(shape="step", size=12.0),
@@ -56,6 +59,9 @@ def recorded(months: Months, rng: np.random.Generator) -> tuple[FloatArray, Floa
     level += months.flicker * flicker(rng, RUNS)
     errors = months.error * np.exp(0.3 * rng.standard_normal(RUNS))
     level += errors * rng.standard_normal(RUNS) + rng.normal(0.0, 10.0)
+    if months.season:
+        year = 2.0 * np.pi * np.arange(RUNS) / 52.0
+        level += months.season * np.sin(year + rng.uniform(0.0, 2.0 * np.pi))
     size = months.size * rng.choice([-1.0, 1.0])
     after = np.maximum(np.arange(RUNS) - (months.onset - 1.0), 0.0)
     level += size * (after if months.shape == "ramp" else np.minimum(after, 1.0))

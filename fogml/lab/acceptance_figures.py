@@ -141,11 +141,13 @@ def figures_of(
         told = [one for one in (steady if key in _OF_BIAS else judged) if getattr(one.after, key) is not None]
         if told:
             limit = limits.by_quantity.get(key)
-            sizes = [abs(getattr(one.after, key)) for one in told]
-            beyond = [0.0 if limit is None else limit.excess(getattr(one.after, key)) for one in told]
-            worst = told[max(range(len(told)), key=lambda place: (beyond[place], sizes[place]))]
-            pair = getattr(worst.before, key), getattr(worst.after, key)
-            yield key, Figure(*pair, worst.run, ci90=_within(key, worst))
+            factors = [_of_few(key, one) for one in told]
+            values = [factor * getattr(one.after, key) for factor, one in zip(factors, told, strict=True)]
+            beyond = [0.0 if limit is None else limit.excess(value) for value in values]
+            place = max(range(len(told)), key=lambda one: (beyond[one], abs(values[one])))
+            worst = told[place]
+            was = factors[place] * getattr(worst.before, key)
+            yield key, Figure(was, values[place], worst.run, ci90=_within(key, worst))
     for key, pair in soaks_tell(steady).items():
         if all(getattr(one.after, key) is None for one in judged):
             yield key, Figure(*pair, "all runs together")
@@ -157,6 +159,13 @@ def figures_of(
             yield "scale_factor_repeatability", _repeated(spread.scale_factor, over)
     yield from _of_rates(before, after)
     yield from _of_noise(before, after, noise)
+
+
+def _of_few(key: str, run: RunJudgement) -> float:
+    """What makes a deviation over n averages that of the standards, over n - 1; 1 for other figures."""
+    counts = {"bias_stability": len(run.series.after), "bias_stability_10s": run.short_averages}
+    n = counts.get(key, 0)
+    return float(np.sqrt(n / (n - 1.0))) if n > 1 else 1.0
 
 
 def _within(key: str, run: RunJudgement) -> tuple[float, float] | None:

@@ -42,7 +42,7 @@ class RunRecord:
     ----------
     key
         SHA-256 over the run's columns, unit, axis, model and averaging time: a run that comes twice has the
-        same.
+        same, whatever else its side file says.
     unit, axis
         Serial number and axis; empty where the run states none.
     run
@@ -60,8 +60,8 @@ class RunRecord:
     outside_training
         Share of the samples outside what the model was trained on.
     beyond_interval
-        Share of the averages that lie beyond the model's 90 % interval about zero; NaN where Earth rate is
-        not known.
+        Share of the averages that lie beyond the model's 90 % interval about zero; NaN where training did not
+        know Earth rate.
     half_width
         Mean half-width of that interval [deg/h].
     averaging_s
@@ -133,8 +133,11 @@ def record_run(
     Raises
     ------
     InputError
-        If the run is empty, of another unit or axis, or holds fewer than `LEAST_WINDOWS` averages.
+        If the run is empty, of another unit or axis, does not state the attitude that tells Earth rate while
+        the model knows it, or holds fewer than `LEAST_WINDOWS` averages.
     """
+    # A model whose training did not tell Earth rate holds it, so that no run's is taken off once more.
+    earth_known = model.card_.earth_known
     means = _Means(averaging_s)
     columns: dict[str, hashlib._Hash] = {}
     first: Run | None = None
@@ -142,6 +145,11 @@ def record_run(
     last_s = 0.0
     for block, evaluation in evaluate_blocks(model, blocks, any_unit=any_unit):
         first = first or block
+        if earth_known and not block.earth_known:
+            raise InputError(
+                f"{block.name}: states no latitude and input_axis, but the model was trained with Earth rate "
+                "known: the run's bias would hold it; state both in the run's side file"
+            )
         for name, values in block.columns.items():
             columns.setdefault(name, hashlib.sha256()).update(np.ascontiguousarray(values).data)
         moving = turning(block) if "rate" in block.columns else np.zeros(len(block), dtype=bool)
@@ -150,12 +158,13 @@ def record_run(
             kept &= ~transition_mask(block)
         half = model.intervals_.half_width(LEVEL, evaluation.excess)
         warmth = leading_temperature(block)
+        reference = block.reference_deg_h if earth_known else 3600.0 * block.rate
         means.add(
             block.time,
             kept,
-            left=block.error_deg_h - (0.0 if block.facts.compensated else evaluation.drift),
+            left=block.gyro_deg_h - reference - (0.0 if block.facts.compensated else evaluation.drift),
             temperature=np.zeros(len(block)) if warmth is None else warmth,
-            reference=block.reference_deg_h,
+            reference=reference,
             half=half,
             moving=moving.astype(np.float64),
             outside=evaluation.outside.astype(np.float64),
@@ -209,9 +218,7 @@ def record_run(
         span_s=last_s - float(first.time[0]),
         samples=float(samples),
         outside_training=outside / samples,
-        beyond_interval=float(np.mean(np.abs(mean["left"][used]) > half))
-        if first.earth_known
-        else float("nan"),
+        beyond_interval=float(np.mean(np.abs(mean["left"][used]) > half)) if earth_known else float("nan"),
         half_width=float(half.mean()),
         averaging_s=averaging_s,
         **told,

@@ -1,16 +1,16 @@
 """Where the records of units in service are kept: a Parquet file in a folder, or a database of many stations.
 
-A record is known by its key, so that one that comes twice is kept once, and a command that was interrupted
-is run again.
+A record is known by its key, so that one that comes twice is kept once, as it came last: a side file that was
+mended counts, and a command that was interrupted is run again.
 """
 
 from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, astuple, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -22,7 +22,7 @@ from fogml.monitor.record import NUMBERS, TEXTS, RunRecord
 from fogml.outputs import sole_writer, whole_file
 
 if TYPE_CHECKING:
-    from sqlalchemy import Engine, Table
+    from sqlalchemy import Connection, Engine, Table
 
 FILE = "runs.parquet"
 TABLE = "fogml_monitor_runs_2"
@@ -37,7 +37,7 @@ class Store(ABC):
 
     @abstractmethod
     def add(self, records: Sequence[RunRecord]) -> int:
-        """Keep records; how many of them were not there yet.
+        """Keep records; how many of them were not there yet. Those that were stand as they came last.
 
         Raises
         ------
@@ -98,10 +98,10 @@ class FolderStore(Store):
                         stack.enter_context(sole_writer(self._file))
                     except InputError as error:
                         raise _Away(str(error)) from None
-                    held = self._read()
-                    new = _not_among(records, {record.key for record in held})
-                    if new:
-                        self._write([*held, *new])
+                    held = {record.key: record for record in self._read()}
+                    new, other = _to_write(records, held)
+                    if new or other:
+                        self._write([*(held | other).values(), *new])
                     return len(new)
             except OSError as error:
                 raise _Away(
@@ -153,16 +153,17 @@ class DatabaseStore(Store):
         self._engine: Engine | None = None
 
     def add(self, records: Sequence[RunRecord]) -> int:
-        from sqlalchemy import insert, select
+        from sqlalchemy import insert, update
         from sqlalchemy.exc import IntegrityError
 
         def write() -> int:
             table, engine = self._open()
             with engine.begin() as connection:
-                known = set(connection.execute(select(table.c.key)).scalars())
-                new = _not_among(records, known)
+                new, other = _to_write(records, _held(connection, table))
                 if new:
                     connection.execute(insert(table), [asdict(record) for record in new])
+                for key, record in other.items():
+                    connection.execute(update(table).where(table.c.key == key), asdict(record))
                 return len(new)
 
         def at_once() -> int:
@@ -175,14 +176,10 @@ class DatabaseStore(Store):
         return self._told(at_once)
 
     def records(self) -> list[RunRecord]:
-        from sqlalchemy import select
-
         def read() -> list[RunRecord]:
             table, engine = self._open()
             with engine.connect() as connection:
-                rows = connection.execute(select(table)).mappings().all()
-            held: list[dict[str, Any]] = [{k: np.nan if v is None else v for k, v in r.items()} for r in rows]
-            return [RunRecord(**values) for values in held]
+                return list(_held(connection, table).values())
 
         return self._told(read)
 
@@ -230,8 +227,29 @@ class _Away(InputError):
     """What waiting may mend."""
 
 
-def _not_among(records: Sequence[RunRecord], known: set[str]) -> list[RunRecord]:
-    return list({record.key: record for record in records if record.key not in known}.values())
+def _held(connection: Connection, table: Table) -> dict[str, RunRecord]:
+    """A database's records by their keys."""
+    from sqlalchemy import select
+
+    rows = connection.execute(select(table)).mappings().all()
+    values = [{k: np.nan if v is None else v for k, v in row.items()} for row in rows]
+    return {str(one["key"]): RunRecord(**one) for one in values}
+
+
+def _to_write(
+    records: Sequence[RunRecord], held: Mapping[str, RunRecord]
+) -> tuple[list[RunRecord], dict[str, RunRecord]]:
+    """Records that are new, and by their keys those that differ from what is held, monitored when it was."""
+    last = {record.key: record for record in records}
+    new = [record for key, record in last.items() if key not in held]
+    again = {key: replace(last[key], monitored=held[key].monitored) for key in last if key in held}
+    return new, {key: record for key, record in again.items() if not _alike(record, held[key])}
+
+
+def _alike(one: RunRecord, other: RunRecord) -> bool:
+    """Whether two records say the same, one NaN being as another."""
+    pairs = zip(astuple(one), astuple(other), strict=True)
+    return all(a == b or (a != a and b != b) for a, b in pairs)
 
 
 def _patiently(action: Callable[[], Answer], patience_s: float) -> Answer:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from itertools import groupby, product
 from typing import Literal
 
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError
+from fogml.errors import InputError, listed
 from fogml.intervals import TAILS
 from fogml.monitor.changes import Chart, Shape, change_chart
 from fogml.monitor.evidence import ChangePrior, flicker_covariance
@@ -68,6 +68,10 @@ NEAREST: dict[tuple[str, Shape], tuple[str, ...]] = {
 """Effects of the catalogue that change a figure so, the usual first; the diagnosis of the runs tells more."""
 LONGEST_DAYS = 36500.0
 """How far ahead a calibration is foretold [d]: what is later is said to be later."""
+EPOCHS = (datetime(1970, 1, 1), datetime(1980, 1, 1), datetime(2000, 1, 1))
+"""Where clocks of loggers begin that were never set: Unix; DOS, and GPS within a week; real-time chips."""
+UNSET_CLOCK = timedelta(days=31)
+"""How long after its epoch a clock is taken for one never set: longer than runs are."""
 State = Literal["baseline", "steady", "alarm"]
 
 
@@ -111,8 +115,8 @@ class UnitWatch:
     chart
         The evidence of change after each run, and the alarms.
     state
-        ``baseline`` while there are too few runs, ``alarm`` if the figures changed and no run has shown a
-        baseline since, else ``steady``.
+        ``baseline`` while there are too few runs, ``alarm`` once the figures changed under this model, else
+        ``steady``.
     calibration
         When to calibrate again; None where too few runs tell it.
     notes
@@ -175,12 +179,18 @@ def watch(
 def _watched(
     records: list[RunRecord], between: float, bias_limit: float | None, prior: ChangePrior
 ) -> UnitWatch:
+    unset = [record.run for record in records if clock_not_set(record)]
     records, age, dated = _in_order(records)
     notes = []
+    if unset:
+        notes.append(
+            f"{listed(unset, 3)}: 'started' is what a clock says that was never set, and so not taken; mend "
+            "it in the side file and give the run again"
+        )
     if not dated and len(records) > 1:
         notes.append(
             "not every run says when it began: they stand in the order in which they were monitored; "
-            "state 'started' in their side files"
+            "state 'started' in their side files and give the runs again"
         )
     last = records[-1]
     alike = (last.model, last.averaging_s)
@@ -217,9 +227,18 @@ def _watched(
     )
 
 
+def clock_not_set(record: RunRecord) -> bool:
+    """Whether a run began, by its own account, where clocks begin."""
+    if not record.started:
+        return False
+    started = datetime.fromisoformat(record.started)
+    started = started if started.tzinfo is None else started.astimezone(UTC).replace(tzinfo=None)
+    return any(timedelta(0) <= started - epoch < UNSET_CLOCK for epoch in EPOCHS)
+
+
 def _in_order(records: Sequence[RunRecord]) -> tuple[list[RunRecord], FloatArray, bool]:
     """Runs by when they began, with the unit's age [d]; by when they were monitored if one does not say."""
-    if not all(record.started for record in records):
+    if not all(record.started and not clock_not_set(record) for record in records):
         placed = sorted(records, key=lambda record: (record.monitored, record.run, record.key))
         return placed, np.arange(float(len(placed))), False
     moments = {record.key: datetime.fromisoformat(record.started) for record in records}

@@ -122,3 +122,14 @@ def test_a_term_under_the_others_is_at_most_its_upper_end(limits):
     open_one = acceptance_json([run], limits=limits(bias_instability=0.9 * bound))
     assert open_one["verdict"] == "incomplete" and "at most" in open_one["reasons"][0]
     assert "≤ " in acceptance_page(open_one) and "! open" in acceptance_page(open_one)
+
+
+def test_bias_stability_is_over_one_less_than_the_averages(limits):
+    """Of few averages the difference decides: over n, three stand 18 % too low."""
+    gyro = EARTH + 0.1 * np.random.default_rng(6).standard_normal(300)
+    columns = {"time": np.arange(300.0), "gyro": gyro, "T": np.full(300, 25.0)}
+    run = Run.from_columns("short", UP, **columns)
+    for key, length in (("bias_stability", 100), ("bias_stability_10s", 10)):
+        true = gyro.reshape(-1, length).mean(axis=1).std(ddof=1)
+        assert row(acceptance_json([run]), key)["before"] == pytest.approx(true, rel=1e-9)
+        assert acceptance_json([run], limits=limits(**{key: 0.97 * float(true)}))["verdict"] == "rejected"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.models.names import make_model
 from fogml.models.saved import load_model
 from fogml.monitor.record import record_run
 from fogml.runs.reading import read_blocks, read_run
@@ -86,6 +87,21 @@ def test_what_the_unit_compensated_itself_is_taken_as_it_is(model, tmp_path):
     done = run.with_columns(gyro=run.gyro - model.predict(run))
     done = done.with_facts(run.facts.model_copy(update={"compensated": True}))
     assert record_run(model, [done]).level == pytest.approx(plain.level, abs=1e-9)
+
+
+def test_earth_rate_counts_where_the_model_knows_it(model, tmp_path):
+    """A side file that states the attitude moves no bias: before, the run's was off by Earth rate."""
+    run = read_run(write_run(tmp_path, 11))
+    up = run.with_facts(run.facts.model_copy(update={"latitude": 39.9, "input_axis": "up"}))
+    assert record_run(model, [up]).level == record_run(model, [run]).level
+    knows = make_model("polynomial", None, 0, {})
+    knows.fit([up])
+    earth = 15.041067 * np.sin(np.radians(39.9))
+    assert record_run(knows, [up]).level == pytest.approx(0.0, abs=1e-3)
+    moved = up.with_columns(gyro=run.gyro + earth)
+    assert record_run(knows, [moved]).level == pytest.approx(earth, abs=1e-3)
+    with pytest.raises(InputError, match="latitude and input_axis"):
+        record_run(knows, [run])
 
 
 def test_a_run_that_is_too_short_is_refused(model, tmp_path):

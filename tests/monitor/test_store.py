@@ -72,6 +72,19 @@ def test_records_come_back_as_they_were_and_once(tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", [0, 1])
+def test_a_run_whose_side_file_was_mended_stands_as_it_came_last(tmp_path, kind):
+    with closing(open_store(places(tmp_path)[kind])) as store:
+        store.add(others(3))
+        mended = replace(
+            others(3)[1], started="2026-02-01T08:00:00+00:00", monitored="2026-05-01T00:00:00+00:00"
+        )
+        assert store.add([mended]) == 0
+        kept = others(3)
+        kept[1] = replace(mended, monitored=RECORD.monitored)
+        same(store.records(), kept)
+
+
+@pytest.mark.parametrize("kind", [0, 1])
 def test_many_stations_write_at_once(tmp_path, kind):
     place = places(tmp_path)[kind]
 

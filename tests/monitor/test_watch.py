@@ -93,6 +93,21 @@ def test_runs_without_a_date_stand_as_they_were_monitored():
         watch(mixed)
 
 
+@pytest.mark.parametrize(
+    "began", ["1970-01-01T00:02:00+00:00", "1980-01-06T01:00:00", "2000-01-03T09:00:00Z"]
+)
+def test_a_clock_that_was_never_set_dates_no_run(began):
+    zone = "" if began[-1] == "0" and "+" not in began else "+00:00"
+    records = [replace(r, started=r.started[:19] + zone) for r in service(12)]
+    records[4] = replace(records[4], started=began)
+    (unit,) = watch(records)
+    assert not unit.dated and unit.calibration is None
+    assert "04.csv" in unit.notes[0] and "never set" in unit.notes[0]
+    # Dated rightly, the unit is as old as its runs are apart.
+    (mended,) = watch(service(12))
+    assert mended.dated and mended.age[-1] == 11.0 and not any("never set" in note for note in mended.notes)
+
+
 def test_first_runs_are_a_baseline():
     (unit,) = watch(service(3))
     assert unit.state == "baseline"
