@@ -232,7 +232,7 @@ def _held(connection: Connection, table: Table) -> dict[str, RunRecord]:
     from sqlalchemy import select
 
     rows = connection.execute(select(table)).mappings().all()
-    values = [{k: np.nan if v is None else v for k, v in row.items()} for row in rows]
+    values: list[dict[str, Any]] = [{k: np.nan if v is None else v for k, v in row.items()} for row in rows]
     return {str(one["key"]): RunRecord(**one) for one in values}
 
 
