@@ -14,7 +14,8 @@ from experiments.real_files.section import Section, table
 from fogml.errors import InputError
 from fogml.readers import READERS
 from fogml.runs.columns import conversion, parse_header
-from fogml.runs.reading import file_format, read_run, read_table
+from fogml.runs.opening import file_format
+from fogml.runs.reading import read_run, read_table
 from tests.readers import files
 from tests.runs import test_excel_habits as excel
 from tests.runs.test_headers import FILES, GYRO, TIME

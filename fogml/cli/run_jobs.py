@@ -13,6 +13,7 @@ from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs, 
 from fogml.cli.terminal import Terminal, number, span
 from fogml.errors import InputError
 from fogml.outputs import whole_file, whole_folder
+from fogml.readers import plain_path
 from fogml.report.words import duration
 from fogml.runs.columns import header
 from fogml.runs.findings import FIRST_OF_ALL
@@ -108,7 +109,7 @@ def _draft(settings: ImportSettings, terminal: Terminal) -> None:
 
 def _check_apart(file: str, out: str, names: Sequence[str]) -> None:
     """Refuse to write a run, with its side file, over the recording that it comes from."""
-    recording = Path(file).resolve()
+    recording = plain_path(Path(file).resolve())
     if Path(out).resolve() == recording.parent and recording.stem in names:
         raise InputError(
             f"--out {out} is the recording's own folder, and '{recording.stem}.csv' with its side file would "

@@ -27,9 +27,10 @@ from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, stated
 from fogml.runs.columns import conversion, parse_header
 from fogml.runs.csv_dialect import csv_dialect
 from fogml.runs.facts import read_side_file, side_file
+from fogml.runs.opening import opened
 from fogml.runs.parquet_files import parquet_marks
 from fogml.runs.raw_table import RawTable
-from fogml.runs.reading import file_format, read_table
+from fogml.runs.reading import read_table
 
 SEGMENTS = ("before", "turn", "after")
 _NEEDED = ("state", "tilt", "rate")
@@ -173,21 +174,21 @@ def _rows(table: RawTable, cells: dict[str, str], state_angles_deg: Sequence[flo
 
 def _segments(path: Path, table: RawTable, cell: str) -> NDArray[np.str_]:
     """The marks of the rows, checked."""
-    kind = file_format(path)
-    if kind == "csv":
-        dialect = csv_dialect(path)
+    source = opened(path)
+    if source.kind == "csv":
+        dialect = csv_dialect(source.path)
         place = dialect.cells.index(cell)
-        opened = dialect.source.open()
-        with io.TextIOWrapper(opened, encoding=dialect.encoding, errors="replace", newline="") as file:
+        raw = dialect.source.open()
+        with io.TextIOWrapper(raw, encoding=dialect.encoding, errors="replace", newline="") as file:
             lines = csv.reader(islice(file, dialect.skipped_lines, None), delimiter=dialect.separator)
             rows = [row for row in lines if any(field.strip() for field in row)]
         marks = np.array([row[place].strip().lower() if place < len(row) else "" for row in rows])
-    elif kind == "parquet":
+    elif source.kind == "parquet":
         marks = np.char.lower(np.char.strip(parquet_marks(path, cell)))
     else:
         raise InputError(
-            f"{table.file}: text in column 'segment' is read from CSV and Parquet files; export it as "
-            "one, or leave the column out, and segments are found from the rate"
+            f"{table.file}: text in column 'segment' is read from CSV, Excel and Parquet files; export it "
+            "as one, or leave the column out, and segments are found from the rate"
         )
     if len(marks) != len(table):
         raise InputError(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["READERS", "Reader", "reader_of", "reader_of_content"]
+__all__ = ["READERS", "Reader", "plain_path", "reader_of", "reader_of_content"]
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,9 @@ READERS = (
     Reader("npz", "NumPy", (".npz",), (), f"{_TABLES}:Npz", "numpy"),
     Reader("workbook", "Excel or OpenDocument", (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
            (b"\xd0\xcf\x11\xe0",), f"{_TABLES}:Workbook", "python_calamine", "xlsx", 2.0, 400.0),
+    Reader("packed", "gzip, bzip2, xz, zstd or zip", (".gz", ".bz2", ".xz", ".zst", ".zip"),
+           (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd"), "fogml.readers.packed:Packed", "numpy",
+           cpu_s_per_mb=1.0),
     Reader("tdms", "TDMS", (".tdms",), (b"TDSm",), f"{_TABLES}:Tdms", "nptdms", "tdms"),
     Reader("mdf", "MDF4", (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), f"{_TABLES}:Mdf", "asammdf", "mdf",
            1.0),
@@ -98,13 +101,19 @@ def reader_of_content(head: bytes, suffix: str) -> Reader | None:
         inside = head[30:60]
         if inside.startswith((b"[Content_Types]", b"mimetype", b"xl/", b"_rels/", b"docProps/")):
             return _BY_NAME["workbook"]
-        return _BY_NAME["npz"] if b".npy" in head[30:1024] else next(iter(named), None)
+        return _BY_NAME["npz"] if b".npy" in head[30:1024] else next(iter(named), _BY_NAME["packed"])
     if head.startswith(_BY_NAME["hdf5"].magic) and suffix == ".mat":
         return _BY_NAME["mat"]
     # Version 2 of miniSEED begins with a number of six digits, a quality and a blank.
     if len(head) > 20 and head[:6].isdigit() and head[6:7] in b"DRQM" and head[7:8] in b" \0":
         return _BY_NAME["miniseed"]
     return next((reader for reader in READERS if reader.magic and head.startswith(reader.magic)), None)
+
+
+def plain_path(path: Path) -> Path:
+    """A file's path without the suffix of what packed it: ``log.csv`` of ``log.csv.gz``."""
+    is_packed = path.suffix.lower() in _BY_NAME["packed"].suffixes and Path(path.stem).suffix
+    return path.with_suffix("") if is_packed else path
 
 
 def extra_hint(reader: Reader, path: Path) -> str:

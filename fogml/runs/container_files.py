@@ -1,4 +1,4 @@
-"""Files whose columns stand in groups of one rate each: logs of vehicles and test benches, workbooks.
+"""Files whose columns stand in groups of one rate each: logs of vehicles and test benches.
 
 The group that holds a clock and a gyro is the run; columns of the run format in other groups, of another
 rate, are brought to its times. Fields that a format's own documents name are known by these names.
@@ -7,11 +7,7 @@ rate, are brought to its times. Fields that a format's own documents name are kn
 from __future__ import annotations
 
 import re
-import shutil
-import tempfile
-import weakref
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,8 +15,6 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError, listed, printable, quoted
 from fogml.readers import reader_of
 from fogml.runs.columns import column_spec, parse_header
-from fogml.runs.csv_dialect import is_sure
-from fogml.runs.csv_files import csv_blocks, read_csv
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.other_rate import Beside, clock_s, interpolated
@@ -249,56 +243,6 @@ def _clock_of(path: Path, stored: StoredFile, group: Group) -> FloatArray:
         raise InputError(f"{path.name}: {quoted(group.name)} has no clock by which it could be joined")
     cell, array = group.column("time")
     return stored.read(array, 0, max(array.shape)) * clock_s(cell, path.name)
-
-
-def sheet_blocks(
-    path: Path, rows: int, columns: Collection[str] | None = None, limits: ReadingLimits = DEFAULT_LIMITS
-) -> Iterator[RawTable]:
-    """The table of the worksheet with a clock and a gyro, else of the first, as `csv_blocks` reads CSV."""
-    folder = _Folder()
-    for table in csv_blocks(_sheet(path, folder, limits), rows, columns):
-        yield _keeping(table, folder)
-
-
-def sheet_table(path: Path, *, repair: bool, limits: ReadingLimits = DEFAULT_LIMITS) -> RawTable:
-    """As `sheet_blocks`, whole, as `read_csv` reads CSV."""
-    folder = _Folder()
-    return _keeping(read_csv(_sheet(path, folder, limits), repair=repair), folder)
-
-
-@contextmanager
-def sheet_file(path: Path) -> Iterator[Path]:
-    """A CSV file of the workbook's name with the worksheet that `sheet_blocks` reads, in the block alone."""
-    folder = _Folder()
-    yield _sheet(path, folder, DEFAULT_LIMITS)
-    shutil.rmtree(folder.name, ignore_errors=True)
-
-
-class _Folder:
-    """A folder that is there as long as this object is."""
-
-    def __init__(self) -> None:
-        self.name = tempfile.mkdtemp(prefix="fogml-sheet-")
-        weakref.finalize(self, shutil.rmtree, self.name, ignore_errors=True)
-
-
-def _sheet(path: Path, folder: _Folder, limits: ReadingLimits) -> Path:
-    """The worksheet as a CSV file of the workbook's name."""
-    with stored_file(path, "workbook", (), limits) as stored:
-        if not stored.arrays:
-            raise InputError(f"{path.name}: holds no cells; a header and samples were expected")
-        sure = (sheet for sheet in stored.arrays if is_sure(next(stored.text(sheet))))
-        sheet = next(sure, stored.arrays[0])
-        file = Path(folder.name) / path.name
-        with file.open("wb") as text:
-            text.writelines(stored.text(sheet))
-    return file
-
-
-def _keeping(table: RawTable, folder: _Folder) -> RawTable:
-    """The table, with its file kept as long as it may be asked for the name of a row."""
-    named = table.row_name
-    return replace(table, row_name=lambda i: named(i) if folder else "")
 
 
 def unknown_fields(path: Path, kind: str, groups: Sequence[Group]) -> InputError:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationError, field_validator
 
 from fogml.errors import InputError, known_are, quoted
+from fogml.readers import plain_path
 from fogml.strict import Strict, first_fault
 from fogml.yaml_text import read_yaml, yaml_text
 
@@ -194,7 +195,8 @@ def facts_from(values: Any, source: str) -> Facts:
 def side_file(run_path: Path) -> Path | None:
     """The side file beside a run: same stem, ``.yaml`` or else ``.yml``; None if there is none."""
     # A root has no name and so no side file.
-    sides = (run_path.with_suffix(suffix) for suffix in SIDE_SUFFIXES if run_path.name)
+    plain = plain_path(run_path)
+    sides = (plain.with_suffix(suffix) for suffix in SIDE_SUFFIXES if plain.name)
     # A folder that can't be looked into holds none; reading the run says what is wrong.
     return next((side for side in sides if os.path.isfile(side)), None)
 

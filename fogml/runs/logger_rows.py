@@ -11,14 +11,15 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted, quoted
+from fogml.readers import plain_path
 from fogml.runs.columns import conversion, is_temperature
-from fogml.runs.container_files import container_columns, sheet_file
+from fogml.runs.container_files import container_columns
 from fogml.runs.findings import Finding
 from fogml.runs.logger_text import LoggerTable, read_logger_text
+from fogml.runs.opening import Opened, opened
 from fogml.runs.other_rate import interpolated
 from fogml.runs.profile_parts import ImportColumn, JoinedLog, LegByState, LegByTime, RowFilter, TextLayout
 from fogml.runs.profile_schema import ImportProfile
-from fogml.runs.reading import file_format
 from fogml.runs.stamps import Stamps
 from fogml.signals import large
 
@@ -33,12 +34,10 @@ def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
     InputError
         If the file does not fit the layout.
     """
-    kind = file_format(path) if path.is_file() and path.stat().st_size else "csv"
-    if kind == "workbook":
-        with sheet_file(path) as sheet:
-            return read_logger_text(sheet, layout, name)
+    file = opened(path) if path.is_file() and path.stat().st_size else Opened("csv", path)
+    kind = file.kind
     if kind == "csv":
-        return read_logger_text(path, layout, name)
+        return read_logger_text(file.path, layout, name)
     if layout.text_sources:
         raise InputError(f"{path.name}: texts and stamps are read from text files; name columns of numbers")
     columns, findings = container_columns(path, kind, layout.sources, _clock(layout))
@@ -161,7 +160,7 @@ def joined_columns(path: Path, log: JoinedLog, stamps: Stamps | None) -> Mapping
     InputError
         If it is missing or does not fit.
     """
-    beside = path.parent / log.file.replace("{stem}", path.stem)
+    beside = path.parent / log.file.replace("{stem}", plain_path(path).stem)
     if not beside.is_file():
         raise InputError(
             f"{beside.name}: no such file beside {path.name}, which the profile joins; copy it there"

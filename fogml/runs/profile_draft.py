@@ -13,15 +13,15 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.columns import column_spec, is_accepted, parse_header
-from fogml.runs.container_files import groups_of, sheet_file
+from fogml.runs.container_files import groups_of
 from fogml.runs.csv_dialect import decoded_head
 from fogml.runs.csv_header import fields_of, is_number_like, labview_header
 from fogml.runs.csv_numbers import PLAIN, Marks, marks_of, number
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.header_spelling import canonical_cells, with_units_below
+from fogml.runs.opening import opened
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.runs.reader_process import stored_file
-from fogml.runs.reading import file_format
 from fogml.runs.reading_limits import DEFAULT_LIMITS
 from fogml.runs.stamps import stamp_form
 
@@ -56,14 +56,8 @@ class _Field:
 
 def draft_profile(path: Path) -> str:
     """The text of an import profile (YAML) for a file: what is sure, and what is a guess and why."""
-    kind = file_format(path)
-    if kind == "workbook":
-        with sheet_file(path) as sheet:
-            layout, fields = _of_text(sheet)
-    elif kind == "csv":
-        layout, fields = _of_text(path)
-    else:
-        layout, fields = _of_container(path, kind)
+    file = opened(path)
+    layout, fields = _of_text(file.path) if file.kind == "csv" else _of_container(path, file.kind)
     lines = [
         "schema: fogml.import/1",
         f"description: {_quoted('draft for ' + path.name)}",

@@ -9,6 +9,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted, quoted
+from fogml.readers import plain_path
 from fogml.runs.assemble import MOST_DROPPED, runs_of_columns
 from fogml.runs.checks import check_run
 from fogml.runs.columns import conversion, parse_header
@@ -78,7 +79,7 @@ def import_recording(
     return runs_from_table(
         table,
         profile,
-        path.stem,
+        plain_path(path).stem,
         path.name,
         axis,
         facts,

@@ -23,7 +23,7 @@ from queue import Queue
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
 
 def reader(place: str, package: str) -> Any:
@@ -42,6 +42,15 @@ def limit_memory(more: int) -> None:
             held = int(file.read().split()[0]) * resource.getpagesize()
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
         resource.setrlimit(resource.RLIMIT_AS, (held + more, hard))
+
+
+def limit_files(most: int | None) -> None:
+    """Let a file that the process writes grow to so many bytes, where the system can tell; None for any."""
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+        resource.setrlimit(resource.RLIMIT_FSIZE, (hard if most is None else most, hard))
 
 
 def limit_time(more_s: float) -> None:
@@ -83,7 +92,11 @@ def answers(
         # What a reader needs is loaded before memory is limited.
         kind = reader(request["reader"], request["package"])
         limit_memory(request["memory"])
-        files[number] = kind(request["path"], request["keys"])
+        limit_files(request["unpacked"])
+        try:
+            files[number] = kind(request["path"], request["keys"])
+        finally:
+            limit_files(None)
         yield files[number].told, b""
     else:
         array = files[number].arrays[request["array"]]
@@ -133,7 +146,8 @@ def main(parent: int) -> None:
             send({"memory": True})
         except OSError as error:
             reason = error.strerror or str(error)
-            send({"room" if error.errno in NO_ROOM else "fault": reason[:500]})
+            kind = "size" if error.errno == errno.EFBIG else "room" if error.errno in NO_ROOM else "fault"
+            send({kind: reason[:500]})
         except Exception as error:  # libraries raise whatever the damage leads to
             reason = next(iter(str(error).splitlines()), type(error).__name__)
             send({"fault": reason[:500]})

@@ -133,6 +133,11 @@ class StoredFile:
                 f"{self.path.name}: damaged, or too large: reading it takes more than "
                 f"{self.memory / 1e6:.0f} MB; copy or export it again"
             )
+        if "size" in told:
+            raise InputError(
+                f"{self.path.name}: damaged: it unpacks to over {self.limits.unpacked(self.path) / 1e6:.0f} "
+                "MB, which no recording of its size does; copy or export it again"
+            )
         if "room" in told:
             raise InputError(
                 f"{self.path.name}: its columns are unpacked into {tempfile.gettempdir()}, which takes no "
@@ -165,7 +170,7 @@ def stored_file(path: Path, kind: str, keys: Sequence[str], limits: ReadingLimit
     try:
         request = {"do": "open", "path": os.path.abspath(path), "keys": list(keys)}
         request |= {"reader": reader.place, "package": reader.package}
-        stored.told = stored.ask({**request, "memory": stored.memory})
+        stored.told = stored.ask({**request, "memory": stored.memory, "unpacked": limits.unpacked(path)})
         stored.arrays = tuple(_array(i, told) for i, told in enumerate(stored.told["arrays"]))
         yield stored
     except _Fault as fault:

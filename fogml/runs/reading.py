@@ -9,12 +9,12 @@ from pathlib import Path
 
 from fogml.errors import InputError, listed, quoted
 from fogml.processes import made_ahead
-from fogml.readers import READERS, reader_of, reader_of_content
 from fogml.runs.assemble import MOST_DROPPED, Assembler, needs_whole, runs_of_table, too_short
 from fogml.runs.checks import check_run
 from fogml.runs.columns import parse_header
 from fogml.runs.findings import Finding
-from fogml.runs.raw_table import RawTable, empty_file
+from fogml.runs.opening import Opened, opened
+from fogml.runs.raw_table import RawTable
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
@@ -22,19 +22,6 @@ from fogml.runs.three_axes import OneAxis
 from fogml.signals.large import Growing
 
 BLOCK_ROWS = 1_000_000
-_HEAD_BYTES = 1024
-_CSV_SUFFIXES = (".csv", ".tsv")
-_FOREIGN = {
-    b"PK\x03\x04": "a zip archive; unpack it first",
-    b"\x1f\x8b": "compressed by gzip; unpack it first",
-    b"BZh": "compressed by bzip2; unpack it first",
-    b"\xfd7zXZ": "compressed by xz; unpack it first",
-    b"\x28\xb5\x2f\xfd": "compressed by zstd; unpack it first",
-    b"7z\xbc\xaf": "a 7-Zip archive; unpack it first",
-    b"%PDF": "a PDF; export the table as CSV",
-    b"ARROW1": "a Feather (Arrow) file; write it as Parquet",
-    b"\x93NUMPY": "one NumPy array, whose columns have no names; write it with names, as numpy.savez does",
-}
 
 
 def read_run(
@@ -104,13 +91,12 @@ def read_runs(
     path = Path(path)
     with unchanged(*run_sources(path)):
         one = OneAxis(axis)
-        kind = file_format(path)
-        size_mb = _size_mb(path, kind)
-        limits.check_repair(path, size_mb if repair else 0.0)
-        if not repair and size_mb > limits.long_mb:
-            long = _joined(path, read_blocks(path, axis=axis, limits=limits), name)
+        file = opened(path, limits)
+        limits.check_repair(path, file.size_mb if repair else 0.0)
+        if not repair and file.size_mb > limits.long_mb:
+            long = _joined(path, _blocks(path, file, None, BLOCK_ROWS, axis, limits), name)
             return [long.with_findings(check_run(long))]
-        table = one.table(_read_table(path, kind, repair, limits))
+        table = one.table(_read_table(file, repair, limits))
         runs = runs_of_table(table, path, repair=repair, name=name, most_dropped=most_dropped)
     return [run.with_findings(check_run(run)) for run in map(one.run, runs)]
 
@@ -167,33 +153,35 @@ def read_blocks(
         )
         return
     with unchanged(*run_sources(path)):
-        assembler = Assembler(path)
-        one = OneAxis(axis)
-        blocks = _table_blocks(path, file_format(path), block_rows, one.columns(columns), limits)
-        for table in map(one.table, made_ahead(blocks)):
-            held = [parse_header(cell)[0] for cell in table.columns]
-            missing = [column for column in columns or () if column not in held]
-            if missing:
-                raise InputError(
-                    f"{path.name}: no column {quoted(missing[0])} of numbers; it holds {listed(held)}"
-                )
-            if assembler.samples == 0 and needs_whole(table):
-                whole = replace(limits, long_mb=math.inf)
-                yield from _cut(read_run(path, axis=axis, limits=whole), columns, block_rows)
-                return
-            yield one.run(assembler.block(table))
-        if assembler.samples < 2:
-            raise too_short(path.name, assembler.samples)
+        yield from _blocks(path, opened(path, limits), columns, block_rows, axis, limits)
 
 
-def _size_mb(path: Path, kind: str) -> float:
-    """What a file holds, unpacked where it tells [MB]."""
-    size = float(path.stat().st_size)
-    if kind == "parquet":
-        from fogml.runs.parquet_files import parquet_values
-
-        size = max(size, 8.0 * parquet_values(path))
-    return size / 1e6
+def _blocks(
+    path: Path,
+    file: Opened,
+    columns: Collection[str] | None,
+    block_rows: int,
+    axis: str | None,
+    limits: ReadingLimits,
+) -> Iterator[Run]:
+    """As `read_blocks`, of a file that is opened."""
+    assembler = Assembler(path)
+    one = OneAxis(axis)
+    blocks = _table_blocks(file, block_rows, one.columns(columns), limits)
+    for table in map(one.table, made_ahead(blocks)):
+        held = [parse_header(cell)[0] for cell in table.columns]
+        missing = [column for column in columns or () if column not in held]
+        if missing:
+            raise InputError(
+                f"{path.name}: no column {quoted(missing[0])} of numbers; it holds {listed(held)}"
+            )
+        if assembler.samples == 0 and needs_whole(table):
+            whole = replace(limits, long_mb=math.inf)
+            yield from _cut(read_run(path, axis=axis, limits=whole), columns, block_rows)
+            return
+        yield one.run(assembler.block(table))
+    if assembler.samples < 2:
+        raise too_short(path.name, assembler.samples)
 
 
 def _joined(path: Path, blocks: Iterable[Run], name: str | None) -> Run:
@@ -224,81 +212,27 @@ def _cut(run: Run, columns: Collection[str] | None, block_rows: int) -> Iterator
 def read_table(path: Path) -> RawTable:
     """The table in a file of any format as it stands, whatever its columns; nothing is repaired."""
     with unchanged(path):
-        return _read_table(path, file_format(path), False, DEFAULT_LIMITS)
+        return _read_table(opened(path), False, DEFAULT_LIMITS)
 
 
-def file_format(path: Path) -> str:
-    """Which of the formats a file has, told by its first bytes: ``csv`` or the name of a reader.
-
-    Raises
-    ------
-    InputError
-        If it is missing, no file, not readable, empty, of a known format that holds no run, or
-        of another format than its suffix says.
-    """
-    kind = _format_of_content(path)
-    suffix = path.suffix.lower()
-    stated = [reader for reader in READERS if suffix in reader.suffixes]
-    if (kind == "csv" and (suffix in _CSV_SUFFIXES or not stated)) or kind in [r.name for r in stated]:
-        return kind
-    if kind == "csv":
-        label = stated[0].label
-        raise InputError(f"{path.name}: damaged or no {label} file (its first bytes are not {label}'s)")
-    reader = reader_of(kind)
-    if not stated and suffix not in _CSV_SUFFIXES:
-        return kind
-    label = stated[0].label if stated else "CSV"
-    raise InputError(
-        f"{path.name}: is a {reader.label} file by its content, and named as {label}; "
-        f"rename it to '{path.stem}{reader.suffixes[0]}'"
-    )
-
-
-def _format_of_content(path: Path) -> str:
-    try:
-        if not path.exists():
-            raise InputError(f"{path}: no such file")
-        if path.is_dir() and (path / "metadata.yaml").is_file():
-            raise InputError(f"{path}: is the folder of a ROS 2 bag; name its .db3 or .mcap file")
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder; name a file")
-        if not path.is_file():
-            raise InputError(f"{path}: is no ordinary file; save the recording to one first")
-        with path.open("rb") as file:
-            head = file.read(_HEAD_BYTES)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    if not head:
-        raise empty_file(path.name)
-    if (reader := reader_of_content(head, path.suffix)) is not None:
-        return reader.name
-    for magic, what in _FOREIGN.items():
-        if head.startswith(magic):
-            raise InputError(f"{path.name}: is {what}")
-    return "csv"
-
-
-def _read_table(path: Path, kind: str, repair: bool, limits: ReadingLimits) -> RawTable:
-    if kind == "csv":
+def _read_table(file: Opened, repair: bool, limits: ReadingLimits) -> RawTable:
+    if file.kind == "csv":
         from fogml.runs.csv_files import read_csv
 
-        return read_csv(path, repair=repair)
-    if kind == "workbook":
-        from fogml.runs.container_files import sheet_table
-
-        return sheet_table(path, repair=repair, limits=limits)
-    (table,) = _table_blocks(path, kind, None, None, limits)
+        return file.keeping(read_csv(file.path, repair=repair))
+    (table,) = _table_blocks(file, None, None, limits)
     return table
 
 
 def _table_blocks(
-    path: Path, kind: str, rows: int | None, columns: Collection[str] | None, limits: ReadingLimits
+    file: Opened, rows: int | None, columns: Collection[str] | None, limits: ReadingLimits
 ) -> Iterator[RawTable]:
+    path, kind = file.path, file.kind
     # Each format's reader, and the package behind it, is loaded only where it is used.
     if kind == "csv":
         from fogml.runs.csv_files import csv_blocks
 
-        return csv_blocks(path, rows or BLOCK_ROWS, columns)
+        return map(file.keeping, csv_blocks(path, rows or BLOCK_ROWS, columns))
     if kind == "parquet":
         from fogml.runs.parquet_files import parquet_blocks
 
@@ -311,8 +245,6 @@ def _table_blocks(
         from fogml.runs.mat_files import mat_blocks
 
         return mat_blocks(path, rows, columns, limits)
-    from fogml.runs.container_files import container_blocks, sheet_blocks
+    from fogml.runs.container_files import container_blocks
 
-    if kind == "workbook":
-        return sheet_blocks(path, rows or BLOCK_ROWS, columns, limits)
     return container_blocks(path, kind, rows, columns, limits)

@@ -68,9 +68,14 @@ class ReadingLimits:
                 "need it"
             )
 
+    def unpacked(self, path: Path) -> int:
+        """Most bytes that a file may stand for."""
+        size = path.stat().st_size if path.exists() else 0
+        return int(self.expansion * size + 1e6 * self.spare_mb)
+
     def check_size(self, path: Path, values: float) -> None:
         """Refuse a file that states more values of 8 bytes than it can hold."""
-        if 8.0 * values > self.expansion * path.stat().st_size + 1e6 * self.spare_mb:
+        if 8.0 * values > self.unpacked(path):
             raise InputError(
                 f"{path.name}: damaged: it states {values:.3g} values, more than a file of its size can "
                 "hold; copy or export it again"

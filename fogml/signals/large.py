@@ -60,10 +60,11 @@ def _reserve(file: Any, size: int) -> None:
         else:
             file.truncate(size)
     except OSError as error:
-        raise _no_room(size, error) from None
+        raise no_room(size, error) from None
 
 
-def _no_room(size: int, error: OSError) -> InputError:
+def no_room(size: int, error: OSError) -> InputError:
+    """What to say where temporary files find no room for so many bytes."""
     return InputError(
         f"{tempfile.gettempdir()}: no room for {size / 1e9:.2g} GB of a long run "
         f"({error.strerror or error}); free some, or let the environment variable TMPDIR name a folder of a "
@@ -94,7 +95,7 @@ class Growing:
                 self._file.write(np.ascontiguousarray(part, dtype=self._kind).data)
             self._file.flush()
         except OSError as error:
-            raise _no_room(self._kind.itemsize * self._count, error) from None
+            raise no_room(self._kind.itemsize * self._count, error) from None
         self._held.clear()
 
     def array(self) -> NDArray[Any]:

@@ -15,8 +15,9 @@ from scipy.io import savemat
 from fogml.errors import InputError
 from fogml.readers import READERS, reader_of
 from fogml.runs import raw_table, reader_process
+from fogml.runs.opening import file_format
 from fogml.runs.profiles import import_recording
-from fogml.runs.reading import file_format, read_blocks, read_run, read_table
+from fogml.runs.reading import read_blocks, read_run, read_table
 from fogml.runs.reading_limits import DEFAULT_LIMITS
 from tests.readers import files
 from tests.readers.files import AXES, COUNT, GYRO, TIME, WARM
