@@ -15,6 +15,7 @@ from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
+from fogml.runs.thermometers import coarse, resolution, spiked
 from fogml.signals import large
 
 STUCK_S = 600.0
@@ -47,6 +48,10 @@ def check_run(run: Run) -> tuple[Finding, ...]:
 
     ``temperature_dropouts``
         Readings of a thermometer that are none (`read_thermometer`).
+    ``temperature_outliers``
+        Other readings that stand out from their neighbours (`spiked`).
+    ``coarse_thermometer``
+        A thermometer of the coil whose steps make a rate of temperature wrong (`coarse`).
     ``gap``
         Intervals longer than 3 median sample intervals.
     ``irregular_sampling``
@@ -66,7 +71,7 @@ def check_run(run: Run) -> tuple[Finding, ...]:
     """
     if len(run) < 2:
         return ()
-    parts = (implausible, _dropouts, _gaps, _irregular, _stuck, _saturated, _outliers, _span)
+    parts = (implausible, _dropouts, spiked, coarse, _gaps, _irregular, _stuck, _saturated, _outliers, _span)
     found: list[Finding] = []
     with np.errstate(over="ignore", invalid="ignore"):  # values near the greatest float
         for part in parts:
@@ -131,7 +136,7 @@ def _stuck(run: Run) -> Iterator[Finding]:
         starts, stops, total = _long_spells(run.time, values)
         if not len(starts):
             continue
-        least = max(MOVED_DEGC, 2.0 * _resolution(values)) if name != "gyro" else MOVED_DEGC
+        least = max(MOVED_DEGC, 2.0 * resolution(values)) if name != "gyro" else MOVED_DEGC
         if name == "gyro":
             # A quiet output of few steps rests at one value for long; a noisy one hardly ever.
             spells = total - len(starts)
@@ -215,14 +220,6 @@ def _long_spells(time: FloatArray, values: FloatArray) -> tuple[IndexArray, Inde
     return starts, stops, total
 
 
-def _resolution(values: FloatArray) -> float:
-    """Smallest step of a column that is not zero; 0 where it never moves."""
-    least = np.inf
-    for _, steps in large.differences(values):
-        least = min(least, float(np.min(np.abs(steps), where=steps != 0.0, initial=np.inf)))
-    return least if np.isfinite(least) else 0.0
-
-
 def _saturated(run: Run) -> Iterator[Finding]:
     gyro = run.gyro
     least, greatest = large.extremes(gyro)
@@ -233,7 +230,7 @@ def _saturated(run: Run) -> Iterator[Finding]:
     extremes = [(extreme, gyro == extreme) for extreme in (greatest, least)]
     if not any(_may_saturate(at) for _, at in extremes):
         return
-    if greatest - least < _LEAST_STEPS * _resolution(gyro):
+    if greatest - least < _LEAST_STEPS * resolution(gyro):
         return  # so few steps hold no shape of noise that could be cut off
     usual = None
     for extreme, at in extremes:

@@ -6,6 +6,7 @@ Each is said before anything else, as every figure after it would be wrong.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import permutations
 
 import numpy as np
 
@@ -49,9 +50,21 @@ HOTTEST_DEGC = 200.0
 """No coil is hotter on average [degC]."""
 COUNTS = 400.0
 """Readings all beyond this are no temperature in any unit."""
-_RELATED_DEGC = 5.0
-_APART_IN_FAHRENHEIT = 10.0
-_NEAR_SHARE = 0.99  # leaves room for rounding
+COLDEST_DEGC = -100.0
+"""No chamber is colder [degC]."""
+HOT_DEGC = 100.0
+"""Coils are specified to 85 degC, as the coating of their fibre is: what reads hotter may be Fahrenheit."""
+HOT_ELECTRONICS_DEGC = 125.0
+"""... and electronics to this."""
+OWN_HEAT_DEGC = 10.0
+"""A gyro's own heat and lags set the ends of two thermometers' ranges apart by less [degC]."""
+HOTTER_DEGC = 30.0
+"""... and such of electronics by less than this [degC]: what is hotter is so in another unit."""
+FAHRENHEIT_SPANS = (1.5, 2.1)
+"""Spans of two thermometers of one set-up have a ratio within these if one reads Fahrenheit: 1.8, but for
+lags and heat that changes; without, about 1."""
+_ENDS = (0.02, 0.98)
+Ends = tuple[float, float]
 
 
 def implausible(run: Run) -> Iterator[Finding]:
@@ -60,7 +73,7 @@ def implausible(run: Run) -> Iterator[Finding]:
     ``already_compensated``
         The facts say so, or columns that ``fogml compensate`` writes are there.
     ``implausible_temperature``
-        A temperature in degC whose numbers are those of kelvin, Fahrenheit or raw counts.
+        A temperature whose numbers are those of another unit: kelvin, Fahrenheit or raw counts.
     ``thermometers_apart``
         The means of two thermometers differ by more than 80 degC.
     ``implausible_earth_rate``
@@ -73,7 +86,10 @@ def implausible(run: Run) -> Iterator[Finding]:
     for name in (name for name, unit in told.items() if unit is not None):
         message = f"'{name}' is stated in degC and {told[name]}"
         yield Finding("implausible_temperature", message, column=name, count=len(run))
-    yield from _thermometers(run, [name for name, unit in told.items() if unit is None])
+    others = [name for name, unit in told.items() if unit is None]
+    found = list(_thermometers(run, others))
+    yield from found
+    yield from () if found else _hot(run, others)
     try:
         gyro = run.gyro_deg_h
     except InputError:
@@ -109,9 +125,11 @@ def _compensated(run: Run) -> Iterator[Finding]:
 def _unit_told(values: FloatArray) -> str | None:
     """What a temperature seems to be in, if not in degC."""
     least, most = large.extremes(values)
+    if most < COLDEST_DEGC and least >= -COUNTS:
+        return f"reads {least:.4g} to {most:.4g}, colder than any chamber: degC under a header with [K]?"
     if least >= -COUNTS and most <= HOTTEST_DEGC:
         return None
-    low, middle, high = large.quantiles(large.parts_of(values), [0.02, 0.5, 0.98])
+    low, middle, high = large.quantiles(large.parts_of(values), [_ENDS[0], 0.5, _ENDS[1]])
     if KELVIN[0] <= low and high <= KELVIN[1] and middle > HOTTEST_DEGC:
         return f"reads {low:.4g} to {high:.4g}: kelvin? Write the header with [K]"
     if low > COUNTS or high < -COUNTS:
@@ -120,24 +138,43 @@ def _unit_told(values: FloatArray) -> str | None:
 
 
 def _thermometers(run: Run, names: Sequence[str]) -> Iterator[Finding]:
-    if _most_apart([run.columns[name] for name in names]) < _NEAR_SHARE * _APART_IN_FAHRENHEIT:
+    if _most_apart([run.columns[name] for name in names]) < HOTTER_DEGC:
         return
-    means = {name: large.median(large.parts_of(run.columns[name])) for name in names}
+    shares = (_ENDS[0], 0.5, _ENDS[1])
+    told = {name: large.quantiles(large.parts_of(run.columns[name]), shares) for name in names}
+    means = {name: middle for name, (_, middle, _) in told.items()}
+    ends = {name: (low, high) for name, (low, _, high) in told.items()}
     pairs = [(a, b) for a in names for b in names if means[b] > means[a]]
     odd = {}
-    for cold, warm in pairs:
-        is_far = means[warm] - means[cold] > _APART_IN_FAHRENHEIT and warm not in odd
-        if is_far and _same_in_fahrenheit(run.columns[warm], run.columns[cold]):
-            odd[warm] = f"'{warm}' is 1.8 times '{cold}' and 32 more: Fahrenheit? Convert it to degC"
-    for name, told in odd.items():
-        yield Finding("implausible_temperature", told, column=name, count=len(run))
+    for cold, warm in permutations(names, 2):
+        if warm not in odd and _in_fahrenheit(ends[warm], ends[cold]):
+            odd[warm] = (
+                f"'{warm}' is 1.8 times '{cold}' and 32 more: Fahrenheit? Write its header with [degF]"
+            )
+    for name, why in odd.items():
+        yield Finding("implausible_temperature", why, column=name, count=len(run))
     a, b = max(pairs, key=lambda pair: means[pair[1]] - means[pair[0]], default=(None, None))
     if a is not None and b is not None and a not in odd and b not in odd and means[b] - means[a] > APART_DEGC:
-        told = (
+        why = (
             f"'{a}' and '{b}' differ by {means[b] - means[a]:.4g} degC ({means[a]:.4g} and {means[b]:.4g}): "
             "is one of them in another unit, or dead?"
         )
-        yield Finding("thermometers_apart", told, column=a, count=len(run))
+        yield Finding("thermometers_apart", why, column=a, count=len(run))
+
+
+def _hot(run: Run, names: Sequence[str]) -> Iterator[Finding]:
+    """Thermometers that read more than gyros stand, where no other one speaks against all of it."""
+    for name in names:
+        hot = HOT_ELECTRONICS_DEGC if name == "T_electronics" else HOT_DEGC
+        if large.extremes(run.columns[name])[1] <= hot:
+            continue
+        low, high = large.quantiles(large.parts_of(run.columns[name]), _ENDS)
+        if high > hot:
+            message = (
+                f"'{name}' reads {low:.4g} to {high:.4g} degC, hotter than fibre gyros are built for: "
+                "Fahrenheit? Write its header with [degF]; if it was so hot, nothing is to be done"
+            )
+            yield Finding("implausible_temperature", message, column=name, count=len(run))
 
 
 def _most_apart(columns: Sequence[FloatArray]) -> float:
@@ -149,10 +186,19 @@ def _most_apart(columns: Sequence[FloatArray]) -> float:
     return float(np.ptp(apart))
 
 
-def _same_in_fahrenheit(warm: FloatArray, cold: FloatArray) -> bool:
-    """Whether one thermometer reads in Fahrenheit what another reads in degC, most of the time."""
-    apart = large.parts_of(warm, lambda a, b: np.abs(a - (1.8 * b + 32.0)), cold)
-    return large.quantiles(apart, [0.9])[0] < _RELATED_DEGC and 1.8 * float(np.ptp(cold)) > _RELATED_DEGC
+def _in_fahrenheit(warm: Ends, cold: Ends) -> bool:
+    """Whether one thermometer reads in Fahrenheit what another reads in degC, by the ends of their ranges.
+
+    There temperatures stay most, so that lags count least.
+    """
+    apart = [(one - 32.0) / 1.8 - other for one, other in zip(warm, cold, strict=True)]
+    span = cold[1] - cold[0]
+    low, high = (share * span for share in FAHRENHEIT_SPANS)
+    return (
+        warm[1] - cold[1] > HOTTER_DEGC
+        and max(map(abs, apart)) < OWN_HEAT_DEGC
+        and low < warm[1] - warm[0] < high
+    )
 
 
 def _scale_factor(run: Run, gyro: FloatArray) -> Iterator[Finding]:

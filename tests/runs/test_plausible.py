@@ -93,6 +93,40 @@ def test_a_unit_taken_for_another_is_off_by_what_one_is_in_the_other(words):
     assert FACTORS[words] == pytest.approx(units[taken][0] / units[true][0])
 
 
+def soaked(own_heat, lag_s=400.0):
+    """A chamber at 25, -40 and 60 degC, and a thermometer beside the coil that lags and is warmer."""
+    time = 10.0 * np.arange(2000)
+    chamber = np.interp(time, [0, 3000, 6000, 10_000, 15_000, 17_000], [25.0, 25.0, -40.0, -40.0, 60.0, 60.0])
+    coil = np.empty_like(chamber)
+    coil[0] = chamber[0]
+    for i in range(1, len(time)):
+        coil[i] = coil[i - 1] + (chamber[i] - coil[i - 1]) * 10.0 / lag_s
+    return {"time": time, "gyro": 0.01 * coil, "T_chamber": chamber, "T_in": coil + own_heat}
+
+
+@pytest.mark.parametrize("reads", [["T_in"], ["T_chamber"], ["T_in", "T_chamber"]])
+def test_fahrenheit_is_told_beside_a_thermometer_that_lags_and_where_all_read_so(reads):
+    sound = soaked(4.0)
+    assert not any("emperature" in one.message for one in implausible(Run("run", sound)))
+    run = Run("run", sound | {name: 1.8 * sound[name] + 32.0 for name in reads})
+    found = [one for one in implausible(run) if one.code == "implausible_temperature"]
+    assert [one.column for one in found] == sorted(reads) and "Fahrenheit" in found[0].message
+
+
+def test_electronics_that_warm_up_fast_are_in_no_other_unit():
+    """Before, ends of 1.8 times a cold coil and 32 more were Fahrenheit, though nothing moved by 1.8."""
+    time = np.arange(6000.0)
+    cold = 18.0 + 3.0 * np.sin(time / 900.0)
+    for electronics in (np.full(6000, 67.0) + 0.1 * np.sin(time), cold + 30.0 - 12.0 * np.exp(-time / 900.0)):
+        run = Run("run", {"time": time, "gyro": cold, "T": cold, "T_electronics": electronics})
+        assert [one.code for one in implausible(run)] == []
+
+
+def test_degrees_celsius_under_kelvin_are_told():
+    run = Run("run", columns(T_in=SOUND["T_in"] - 273.15))
+    assert any("[K]" in one.message for one in implausible(run) if one.column == "T_in")
+
+
 @pytest.mark.parametrize(("middle", "unit"), [(330.0, "kelvin"), (417.0, "raw counts")])
 def test_a_coil_in_kelvin_is_not_beyond_what_a_gyro_stands(middle, unit):
     run = Run("run", columns(T_in=middle + np.linspace(-10.0, 10.0, ROWS)), FACTS)
