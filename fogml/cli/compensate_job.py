@@ -16,6 +16,7 @@ from fogml.cli.model_commands import CompensateSettings
 from fogml.cli.runs import open_blocks
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
+from fogml.runs.findings import dead_words
 from fogml.runs.run import Run
 
 if TYPE_CHECKING:
@@ -48,17 +49,22 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
         settings.written_beside(out, "compensate"),
         terminal.work(f"compensating {settings.run}", total=total) as work,
     ):
-        counts = _compensate(model, chain(begun, blocks), out, settings.any_unit, work)
+        counts, still = _compensate(model, chain(begun, blocks), out, settings.any_unit, work)
+    if still is not None:
+        terminal.note(f"{Path(settings.run).name}: {dead_words(still)}")
     memories = [atom.text for atom in model.features_.atoms if atom.settles] if model.features_ else []
     _print(settings, model.describe()["kind"], memories, counts, terminal)
 
 
-def _compensate(model: DriftModel, blocks: Iterable[Run], out: Path, any_unit: bool, work: Work) -> IntArray:
-    """Write the compensated run; how many samples got each flag, shape (3,)."""
+def _compensate(
+    model: DriftModel, blocks: Iterable[Run], out: Path, any_unit: bool, work: Work
+) -> tuple[IntArray, float | None]:
+    """Write the compensated run; how many samples got each flag, shape (3,), and an output's only value."""
     from fogml.models.compensation import compensate_blocks
     from fogml.runs.writing import BlockWriter, carried_cells, header_cells
 
     counts = np.zeros(len(FLAGS), dtype=np.int64)
+    low, high = np.inf, -np.inf
     written: Future[None] | None = None
     with ExitStack() as stack:
         for block, compensation in compensate_blocks(model, blocks, any_unit=any_unit):
@@ -73,11 +79,12 @@ def _compensate(model: DriftModel, blocks: Iterable[Run], out: Path, any_unit: b
                 writer.write, {**recorded, **compensation.columns()}, carried_cells(block)
             )
             counts += np.bincount(compensation.flag, minlength=len(FLAGS))
+            low, high = min(low, float(block.gyro.min())), max(high, float(block.gyro.max()))
             work.advance(len(block))
         if written is None:
             raise InputError("the run holds no samples, there is nothing to compensate")
         written.result()
-    return counts
+    return counts, low if low == high else None
 
 
 def _print(

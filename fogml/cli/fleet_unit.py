@@ -163,8 +163,10 @@ class UnitWork:
 
     def _constants(self, unit: Unit, runs: Sequence[Run]) -> dict[str, Any] | None:
         from fogml.fleet.constants import UnitConstants
+        from fogml.runs.checks import refuse_dead
 
         try:
+            refuse_dead(runs)
             return UnitConstants.of(runs, self.form, unit.covariates).as_dict()
         except InputError:
             return None
@@ -183,11 +185,16 @@ def check_belong(unit: Unit, runs: Sequence[Run]) -> None:
 
 def _told(judgement: Judgement) -> dict[str, Any]:
     worst = max(judgement.test, key=lambda run: run.after.rms)
+    still = [
+        f"the output of {run.run} stands still: {run.still[0]}"
+        for run in (*judgement.train, *judgement.test)
+        if run.still
+    ]
     return {
         "model": str(judgement.model["kind"]),
         "met": judgement.met,
         "worst": _worst(worst, worst.before.rms, worst.after.rms, worst.outside_training),
-        "notes": [str(note) for note in (*judgement.notes, *judgement.model.get("notes", ()))],
+        "notes": [str(note) for note in (*still, *judgement.notes, *judgement.model.get("notes", ()))],
     }
 
 

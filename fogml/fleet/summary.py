@@ -152,6 +152,8 @@ def _why_again(unit: Mapping[str, Any]) -> str:
         return "not every limit is tested" if not_tested else "a stated limit is not met"
     if unit["after"] is None:
         return ""
+    if still := [note for note in unit["notes"] if "stands still" in note]:
+        return still[0]
     if unit["after"] > unit["before"]:
         return "the model does harm on the test run: training and test runs do not tell the same"
     if (unit["outside_training"] or 0.0) > _OUTSIDE:

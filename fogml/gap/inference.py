@@ -20,6 +20,7 @@ from fogml.gap.rows import Rows
 from fogml.gap.scene import Scene, outstanding_lines
 from fogml.gap.search import Explanation, Search
 from fogml.gap.settings import Priors, RowSettings
+from fogml.runs.checks import refuse_dead
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin import Twin
@@ -29,6 +30,7 @@ def check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -
     """Refuse runs that can't be diagnosed together."""
     if not fit:
         raise InputError("no run to diagnose is given")
+    refuse_dead((*fit, *held_out))
     held: dict[str, tuple[str, str]] = {}
     for role, runs in (("fit", fit), ("held-out", held_out)):
         for run in runs:

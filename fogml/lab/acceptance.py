@@ -61,7 +61,8 @@ def acceptance_json(
     -------
     dict
         Schema ``fogml.acceptance/1``. ``verdict`` is ``accepted``, ``rejected`` where a limit is missed,
-        ``incomplete`` where none is and one was not tested, or the model has seen a run, and ``no_limits``.
+        ``incomplete`` where none is and one was not tested, an output stands still, or the model has seen a
+        run, and ``no_limits``.
 
     Raises
     ------
@@ -78,7 +79,8 @@ def acceptance_json(
     figures = dict(figures_of(runs, after, judged, noise, limits))
     rows = [_row(one, figures.get(one.key), limits, model is not None) for one in QUANTITIES]
     seen = _seen(runs, model)
-    verdict, reasons = _verdict(rows, limits, seen)
+    still = [f"{one.run}: the output stands still: {one.still[0]}" for one in judged if one.still]
+    verdict, reasons = _verdict(rows, limits, seen, still)
     earth = all(run.earth_known for run in runs)
     notes = [] if earth else ["Earth rate is not known (latitude, input_axis): the bias holds it."]
     notes += [f"{name}: the model was trained on this run" for name in seen]
@@ -193,17 +195,19 @@ def _seen(runs: Sequence[Run], model: DriftModel | None) -> list[str]:
     return [run.name for run in runs if run.hash in known]
 
 
-def _verdict(rows: Sequence[Mapping[str, Any]], limits: Limits, seen: Sequence[str]) -> tuple[str, list[str]]:
+def _verdict(
+    rows: Sequence[Mapping[str, Any]], limits: Limits, seen: Sequence[str], still: Sequence[str]
+) -> tuple[str, list[str]]:
     if not limits.by_quantity:
-        return NO_LIMITS, ["no limits are stated"]
+        return NO_LIMITS, [*still, "no limits are stated"]
     limited = [row for row in rows if row["limit"] is not None]
     missed = [f"{row['name']} is over its limit" for row in limited if row["met"] is False]
     lacking = [_lacking(row) for row in limited if row["met"] is None]
     fitted = [f"{name} is a training run of the model, which says nothing of another run" for name in seen]
     if missed:
-        return REJECTED, [*missed, *lacking, *fitted]
-    if lacking or fitted:
-        return INCOMPLETE, [*lacking, *fitted]
+        return REJECTED, [*still, *missed, *lacking, *fitted]
+    if still or lacking or fitted:
+        return INCOMPLETE, [*still, *lacking, *fitted]
     return ACCEPTED, [f"all {len(limited)} limits are met"]
 
 

@@ -16,6 +16,7 @@ from fogml.models.base import OUTSIDE, DriftModel
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
 from fogml.monitor.figures import Averages, run_figures
+from fogml.runs.findings import dead_words
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.runs.transitions import transition_mask
@@ -134,7 +135,7 @@ def record_run(
     ------
     InputError
         If the run is empty, of another unit or axis, does not state the attitude that tells Earth rate while
-        the model knows it, or holds fewer than `LEAST_WINDOWS` averages.
+        the model knows it, holds fewer than `LEAST_WINDOWS` averages, or one value in every sample.
     """
     # A model whose training did not tell Earth rate holds it, so that no run's is taken off once more.
     earth_known = model.card_.earth_known
@@ -143,6 +144,7 @@ def record_run(
     first: Run | None = None
     samples = outside = 0
     last_s = 0.0
+    low, high = np.inf, -np.inf
     for block, evaluation in evaluate_blocks(model, blocks, any_unit=any_unit):
         first = first or block
         if earth_known and not block.earth_known:
@@ -170,10 +172,13 @@ def record_run(
             outside=evaluation.outside.astype(np.float64),
         )
         samples += len(block)
+        low, high = min(low, float(block.gyro.min())), max(high, float(block.gyro.max()))
         outside += int(np.sum(evaluation.flag == OUTSIDE))
         last_s = float(block.time[-1])
     if first is None:
         raise InputError("the run holds no samples, there is nothing to monitor")
+    if low == high:
+        raise InputError(f"{first.name}: {dead_words(low)}; it is not kept, record it again")
     time, mean = means.values()
     rest = mean["moving"] == 0.0
     used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(time), dtype=bool)

@@ -60,9 +60,10 @@ def stated_limits(judgement: Judgement) -> list[LimitOutcome]:
 def verdict(judgement: Judgement) -> list[str]:
     """Sentences, the most important first: what is left of what, and what the reader must know."""
     worst = worst_run(judgement.test)
+    still = worst.still is not None and worst.still[1] > Asked().mostly_still
     return [
-        *_what_is_left(judgement, worst),
-        *_bias(worst),
+        *(_still(judgement) if still else _what_is_left(judgement, worst)),
+        *([] if still else _bias(worst)),
         *_seen(judgement),
         *_limits(stated_limits(judgement)),
         *_outside(judgement.test),
@@ -98,11 +99,21 @@ def own_noise(run: RunJudgement) -> str:
 
     A bias that the floor of one average could not hide is told apart: noise has no mean.
     """
+    if run.still is not None:
+        return f"On {run.run} the output stands still: whether it is the gyro's own noise can't be told."
     if not left_is_noise(run):
         return "What is left is not the gyro's own noise alone."
     biased = abs(run.after.bias) > run.floor
     lead = f"Beside a bias of {number(run.after.bias)} deg/h, what" if biased else "What"
     return f"{lead} is left is the gyro's own noise, as far as these averages tell."
+
+
+def _still(judgement: Judgement) -> list[str]:
+    return [
+        f"On {run.run} nothing is judged: {run.still[0]}"
+        for run in judgement.test
+        if run.still is not None and run.still[1] > Asked().mostly_still
+    ]
 
 
 def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:

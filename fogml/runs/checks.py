@@ -5,12 +5,13 @@ Nothing is changed; each finding says where and how much.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
-from fogml.runs.findings import Finding
+from fogml.errors import InputError
+from fogml.runs.findings import DEAD, Finding, dead_words
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
 from fogml.runs.run import Run
@@ -60,6 +61,8 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         A temperature holds one value for over 10 min while another moves by more than 0.5 degC
         and more than twice the sensor's resolution; or the gyro does, whose samples else differ,
         or holds one for 60 samples and ten times as long as it does else, no table turning.
+    ``dead_output``
+        The gyro has one value in every sample.
     ``saturation``
         The gyro stays at its greatest or least value for 3 samples on end, or is there in 10 in
         all, and over 3 times more often than at the value next to it, so that noise is cut off
@@ -71,13 +74,32 @@ def check_run(run: Run) -> tuple[Finding, ...]:
     """
     if len(run) < 2:
         return ()
-    parts = (implausible, _dropouts, spiked, coarse, _gaps, _irregular, _stuck, _saturated, _outliers, _span)
+    parts = (
+        implausible,
+        _dropouts,
+        spiked,
+        coarse,
+        _gaps,
+        _irregular,
+        _stuck,
+        _dead,
+        _saturated,
+        _outliers,
+        _span,
+    )
     found: list[Finding] = []
     with np.errstate(over="ignore", invalid="ignore"):  # values near the greatest float
         for part in parts:
             found += part(run)
             large.release()
     return tuple(found)
+
+
+def refuse_dead(runs: Iterable[Run]) -> None:
+    """Refuse runs whose output has one value in every sample, unless of a twin, which may have no noise."""
+    for run in runs:
+        for finding in _dead(run) if not run.facts.synthetic else ():
+            raise InputError(f"{run.name}: {finding.message}; leave the run out, or record it again")
 
 
 def _dropouts(run: Run) -> Iterator[Finding]:
@@ -220,12 +242,16 @@ def _long_spells(time: FloatArray, values: FloatArray) -> tuple[IndexArray, Inde
     return starts, stops, total
 
 
+def _dead(run: Run) -> Iterator[Finding]:
+    least, greatest = large.extremes(run.gyro)
+    if greatest == least:
+        yield Finding(DEAD, dead_words(greatest), column="gyro", row=1, count=len(run))
+
+
 def _saturated(run: Run) -> Iterator[Finding]:
     gyro = run.gyro
     least, greatest = large.extremes(gyro)
     if greatest == least:
-        message = f"'gyro' is {greatest:.6g} in every sample; the output may be dead"
-        yield Finding("saturation", message, column="gyro", row=1, count=len(gyro))
         return
     extremes = [(extreme, gyro == extreme) for extreme in (greatest, least)]
     if not any(_may_saturate(at) for _, at in extremes):

@@ -6,7 +6,10 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
+DEAD = "dead_output"
+"""Code of an output that has one value in every sample."""
 FIRST_OF_ALL = (
+    DEAD,
     "already_compensated",
     "implausible_temperature",
     "thermometers_apart",
@@ -21,6 +24,17 @@ FIRST_OF_ALL = (
 def first_of_all(findings: Iterable[Finding]) -> list[Finding]:
     """Findings, those first that make every figure wrong."""
     return sorted(findings, key=lambda finding: finding.code not in FIRST_OF_ALL)
+
+
+def standstill(findings: Iterable[Finding]) -> Finding | None:
+    """The finding that a gyro's output stands still, in every sample or for long; None where it moves."""
+    stuck = ("stuck_sensor", "gyro")
+    return next((one for one in findings if one.code == DEAD or (one.code, one.column) == stuck), None)
+
+
+def dead_words(value: float) -> str:
+    """What is said of an output of one value."""
+    return f"'gyro' is {value:.6g} in every sample, as of a gyro that is not connected or not switched on"
 
 
 @dataclass(frozen=True)

@@ -27,11 +27,13 @@ class Asked:
     Attributes
     ----------
     outside
-        Share of a test run at temperatures and rates that training did not hold, from which on care is
-        due: a hundredth, as less is a sample or two at the ends of a range.
+        Share of a test run at temperatures and rates that training did not hold, from which on care is due:
+        less than a hundredth is a sample or two at the ends of a range.
     mostly_outside
         The same from which on the judgement is of another model than the one in use: over half. Where it
         does not take away what it should there, it is not to be used.
+    mostly_still
+        Share of a run's samples at which the output stands still, from which on the run says nothing: half.
     beside
         Share of the rms on the worst test run by which a model judged beside has to leave less before it is
         named instead: two fits of one unit differ by as much from run to run.
@@ -42,6 +44,7 @@ class Asked:
 
     outside: float = 0.01
     mostly_outside: float = 0.5
+    mostly_still: float = 0.5
     beside: float = 0.05
     coverage: float = 0.8
 
@@ -64,10 +67,8 @@ class Advice:
     ----------
     grade
         Of the gravest reason; ``use`` where there is none.
-    brief
-        That reason in a few words.
-    reasons
-        Sentences, the gravest first; where nothing speaks against use, what speaks for it.
+    brief, reasons
+        It in a few words; sentences, the gravest first; where nothing speaks against use, what speaks for it.
     next_step
         What to do now.
     """
@@ -135,16 +136,35 @@ def coverage(run: RunJudgement) -> float | None:
 
 
 def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
+    for runs, what in ((judgement.train, "learnt"), (judgement.test, "judged")):
+        yield from (still for run in runs if (still := _still(run, asked, what)))
     yield from _not_judged(judgement)
     yield from _one_way(judgement)
     yield from _one_temperature(judgement)
     for run in judgement.test:
-        yield from _of_run(run, asked)
+        still = _still(run, asked, "judged")
+        if still is None or still.grade != "do_not_use":
+            yield from _of_run(run, asked)
     better, told = which_to_use(judgement, asked)
     if better is not None:
         yield Reason("do_not_use", f"{better} leaves less", told, f"Train {better} in its place.")
     yield from _limits(judgement)
     yield from _another_unit(judgement)
+
+
+def _still(run: RunJudgement, asked: Asked, what: str) -> Reason | None:
+    """What speaks against a model where the gyro's output stood still."""
+    if run.still is None:
+        return None
+    told, share = run.still
+    mostly = share > asked.mostly_still
+    how = f"nothing is {what} there" if mostly else f"what is {what} there goes by it"
+    return Reason(
+        "do_not_use" if mostly else "use_with_care",
+        f"the output of {run.run} stands still",
+        f"{run.run}: {told}. At {share:.0%} of the samples the output stands still: {how}.",
+        f"See whether the gyro was connected and switched on, and record {run.run} again.",
+    )
 
 
 def _not_judged(judgement: Judgement) -> Iterator[Reason]:

@@ -128,8 +128,10 @@ def left_is_noise(judged: RunJudgement) -> bool:
     """Whether what is left after a model is the gyro's own noise, as far as the averages can tell.
 
     Their standard deviation is at most the upper end of its interval for noise alone, of the upper end of the
-    floor's.
+    floor's; an output that stands still tells nothing of it.
     """
+    if judged.still is not None:
+        return False
     upper = judged.floor if judged.floor_ci90 is None else judged.floor_ci90[1]
     return judged.after.bias_stability <= floor_interval(upper, len(judged.series.time) - 1)[1]
 

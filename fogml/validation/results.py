@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fogml.arrays import FloatArray
 from fogml.pictures import AFTER, BEFORE, Panel, Pictured, in_time
 from fogml.runs.facts import Facts
-from fogml.runs.findings import Finding
+from fogml.runs.findings import Finding, standstill
 
 
 @dataclass(frozen=True)
@@ -148,6 +148,14 @@ class RunJudgement:
     scale_factor_half_width: float | None = None
     soaks: tuple[SoakBias, ...] = ()
     not_settled: float = 0.0
+
+    @property
+    def still(self) -> tuple[str, float] | None:
+        """What is said of an output that stands still, and the share of the samples that do; else None."""
+        found = standstill(self.findings)
+        if found is None:
+            return None
+        return found.message, found.count / max(self.rows_used + self.rows_left_out, found.count)
 
 
 @dataclass(frozen=True)

@@ -135,7 +135,12 @@ def test_records_without_noise_have_no_gap_to_the_twin_that_made_them():
 
 def still():
     time = np.arange(0.0, 7200.0, 10.0)
-    return Run.from_columns("still", time=time, gyro=np.zeros(len(time)), T=np.full(len(time), 25.0))
+    return Run.from_columns("still", time=time, gyro=np.sin(time), T=np.full(len(time), 25.0))
+
+
+def of_a_gyro(run):
+    """A run of no twin, whose gyro was not connected."""
+    return replace(run.with_columns(gyro=np.zeros(len(run))), facts=Facts())
 
 
 def of_unit(run, name):
@@ -149,6 +154,7 @@ def of_unit(run, name):
         (lambda a, b, c: ([a, a], [c], {}), "the same samples as a.csv; give each run once"),
         (lambda a, b, c: ([a, of_unit(b, "other")], [c], {}), "runs are of different units"),
         (lambda a, b, c: ([still()], [c], {}), "temperature moves by 0 degC in all"),
+        (lambda a, b, c: ([of_a_gyro(a)], [c], {}), "'gyro' is 0 in every sample"),
         (lambda a, b, c: ([a[:15]], [c], {}), "a diagnosis needs more"),
         (lambda a, b, c: ([], [c], {}), "no run to diagnose"),
         (lambda a, b, c: ([a], [c], {"without": ["no_such"]}), "--without no_such: there is no such effect"),

@@ -265,7 +265,10 @@ class TestSaturation:
     def test_a_dead_output(self):
         columns = noisy()
         columns["gyro"] = np.full(20_000, 3.0)
-        assert one(columns, "saturation").count == 20_000
+        finding = one(columns, "dead_output")
+        assert finding.count == 20_000 and "3 in every sample" in finding.message
+        assert "not connected" in finding.message
+        assert codes(columns)[0] == "dead_output"
 
 
 class TestStuckSensors:

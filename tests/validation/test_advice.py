@@ -17,6 +17,15 @@ from tests.report.judgements import FLOOR, judgement
 
 SEEN = Finding("seen_in_training", "holds the same samples as training run a.csv")
 
+DEAD = Finding("dead_output", "'gyro' is 0 in every sample, as of one not connected", "gyro", 1, 36128)
+STUCK = Finding("stuck_sensor", "'gyro' stays at 1.5 from 10 s to 8000 s", "gyro", 10, 8000)
+
+
+def trained_on(finding: Finding) -> Judgement:
+    """A judgement of a model that was trained on a run of which something was noticed."""
+    base = judgement()
+    return replace(base, train=(replace(base.train[0], findings=(finding,)),))
+
 
 def of_ways(run: RunJudgement, way: str) -> RunJudgement:
     """A run whose temperature goes one way only."""
@@ -66,6 +75,10 @@ def test_nothing_against_is_use() -> None:
         (lambda: one_way("up", "up"), "use_with_care", "trained one way"),
         (lambda: judgement(findings=(SEEN,)), "do_not_use", "not judged on another run"),
         (lambda: judgement(left=3.0), "do_not_use", "worse than none on b.csv"),
+        (lambda: judgement(left=3.0, findings=(DEAD,)), "do_not_use", "the output of b.csv stands still"),
+        (lambda: judgement(findings=(STUCK,)), "use_with_care", "the output of b.csv stands still"),
+        (lambda: trained_on(STUCK), "use_with_care", "the output of a.csv stands still"),
+        (lambda: trained_on(DEAD), "do_not_use", "the output of a.csv stands still"),
         (lambda: judgement(offset=-2.0), "use_with_care", "the mean of b.csv moved"),
         (lambda: judgement(left=1.0, offset=-2.0), "do_not_use", "takes away less than the noise on b.csv"),
         (lambda: judgement(left=3.0, offset=-5.0), "use_with_care", "less steady than without on b.csv"),
