@@ -59,6 +59,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "gyro_unit": repr(2.0**-scales.gyro_bits),
         "compensated_value": 2.0**-OUTPUT_BITS,
         "compensated_unit": repr(2.0**-OUTPUT_BITS),
+        "compensated_most": f"{2 ** (31 - OUTPUT_BITS)}.0",
         "atom_bits": scales.atoms.tolist(),
         "column_bits": scales.columns.tolist(),
         "drift_bits": scales.drift,
@@ -70,7 +71,11 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         if plan.gives_rate and plan.gyro_unit == "count"
         else f"output as rate, whole steps of 2^-{OUTPUT_BITS} deg/h"
     )
-    compensated = f"Outputs are whole steps of 2^-{OUTPUT_BITS} deg/h; the units are defined below."
+    most = 2 ** (31 - OUTPUT_BITS)
+    compensated = [
+        f"Outputs are whole steps of 2^-{OUTPUT_BITS} deg/h; the units are defined below. They hold {most}",
+        f"deg/h ({most / 3600.0:.0f} deg/s) either way; what lies beyond stays at that end, without a flag.",
+    ]
     units = units_of(plan, gyro, f"whole steps of 2^-{bits} degC, in the order of the places below")
     exp_terms = [round((-log(2.0)) ** n / factorial(n) * 2.0**30) for n in range(10, -1, -1)]
     rates = any(o.method not in ("first", "own") or o.unit_s for o in windows.operators)
@@ -93,7 +98,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "exp_type": "int64_t",
         "phase_type": "int32_t",
         "held_type": "int32_t",
-        "units": [*units, compensated],
+        "units": [*units, *compensated],
         "constants": _constants(plan, windows, scales, dtype),
         "exp_error": EXP_ERROR,
         "exp_terms": exp_terms,

@@ -477,3 +477,18 @@ def test_the_header_says_in_what_the_output_is_given(model_of, name, unit, told)
     plan = replace(Plan.of(model_of(name)), gyro_unit=unit)
     header = c_source(plan, "q15", []).files["fogml_model.h"]
     assert told in next(line for line in header.splitlines() if line.startswith(" *   gyro "))
+
+
+@pytest.mark.parametrize("dtype", ["q31", "q15"])
+def test_an_output_beyond_its_range_is_the_end_that_the_header_states(model_of, tmp_path, dtype):
+    source = c_source(Plan.of(model_of("M2")), dtype, [])
+    most = float(re.search(r"COMPENSATED_MOST_DEG_H (\S+)", source.files["fogml_model.h"])[1])
+    assert most == 2.0**31 * source.numbers["fixed"]["compensated_value"]
+    run = training_run()[:60]
+    drift = run.gyro - outputs(CProgram(source, tmp_path, flags=QUICK), source, run)[0]
+    # As far from the end as the drift goes, either way, in steps of 2^-12 deg/h.
+    for end in (most - 2.0**-12, 2.0**-12 - most):
+        for off in (-40.0, 0.0, 40.0):
+            given = np.clip(end + off, -most, most - 2.0**-12) + np.zeros(len(run))
+            found, _ = outputs(CProgram(source, tmp_path, flags=QUICK), source, run.with_columns(gyro=given))
+            np.testing.assert_allclose(found, np.clip(given - drift, -most, most), atol=2.0**-11)
