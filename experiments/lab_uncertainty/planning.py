@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,7 +16,7 @@ from experiments.lab_uncertainty.signals import Noise
 from fogml.arrays import FloatArray
 from fogml.gap.frame import Setting, fixed_columns, whitener_of
 from fogml.gap.model import EffectValue
-from fogml.gap.planning.fisher import Unknowns, covariance, information, unknowns, usual_value
+from fogml.gap.planning.fisher import Unknowns, expected, unknowns, usual_value
 from fogml.gap.planning.programme_design import Design
 from fogml.gap.planning.programme_family import Family
 from fogml.gap.planning.rehearsal import FINE_S, Rehearsal, Stage, stage
@@ -37,20 +37,22 @@ DESIGN = Design(rates=(1.0, None, None), ladder="rates")
 class Promise:
     """What is wanted of a programme of 8 h; or a pair to be told apart, at the distance that is enough.
 
-    Thermometers are exact, or the twin's; shapes of effects are those of the plan, or drawn.
+    Thermometers are exact, or the twin's; shapes of effects are those of the plan, or drawn: evenly over
+    their range, or from the catalogue's prior.
     """
 
     want: tuple[str, ...] = ()
     apart: tuple[str, str] | None = None
     thermometers: bool = False
-    drawn: bool = False
+    drawn: Literal["", "range", "prior"] = ""
 
 
 CASES = {
     "constants": Promise(("k1", "k2", "b1", "b2")),
     "constants, thermometers of the twin": Promise(("k1", "k2", "b1", "b2"), thermometers=True),
     "hysteresis as planned": Promise(("thermal_hysteresis",)),
-    "hysteresis, width drawn": Promise(("thermal_hysteresis",), drawn=True),
+    "hysteresis, width of the catalogue's prior": Promise(("thermal_hysteresis",), drawn="prior"),
+    "hysteresis, width drawn": Promise(("thermal_hysteresis",), drawn="range"),
     "rate times temperature": Promise(("temperature_rate_product",)),
     "hysteresis, rate times temperature": Promise(apart=("thermal_hysteresis", "temperature_rate_product")),
     "rate times temperature, hysteresis": Promise(apart=("temperature_rate_product", "thermal_hysteresis")),
@@ -189,7 +191,7 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
 
 def _errors(bench: Bench, name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
     of: Unknowns = unknowns(bench.on, bench.case.want)
-    deviations = np.sqrt(np.diag(covariance(information(bench.rehearsal, of))))
+    deviations = np.sqrt(np.diag(expected(bench.rehearsal, of)))
     promised = {of.parameters[i].name: float(deviations[i]) * of.parameters[i].scale for i in of.wanted}
     told: dict[str, list[Told | None]] = {}
     for repeat in range(repeats):
@@ -207,8 +209,10 @@ def _errors(bench: Bench, name: str, repeats: int, seed: int) -> list[dict[str, 
 
 
 def _drawn(one: EffectValue, bench: Bench, rng: np.random.Generator) -> EffectValue:
-    ranges = {q.name: q.range(bench.twin.grade) for q in effect(one.id).shape}
-    return replace(one, shape={key: float(rng.uniform(*ends)) for key, ends in ranges.items()})
+    shape, grade = effect(one.id).shape, bench.twin.grade
+    if bench.case.drawn == "prior":
+        return replace(one, shape={q.name: q.draw(rng, grade) for q in shape})
+    return replace(one, shape={q.name: float(rng.uniform(*q.range(grade))) for q in shape})
 
 
 def _apart(bench: Bench, name: str, repeats: int, seed: int) -> list[dict[str, Any]]:

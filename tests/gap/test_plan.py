@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.gap.planning.fisher import information, merit, responses, unknowns
+from fogml.gap.planning.fisher import expected, information, merit, responses, unknowns
 from fogml.gap.planning.plan import plan_runs
 from fogml.gap.planning.plan_result import plan_values
 from fogml.gap.planning.programme_design import Design
@@ -17,6 +17,7 @@ from fogml.gap.planning.rehearsal import FINE_S, Rehearsal, Together, stage
 from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.registry import effect
 from fogml.twin.replay import Replayer
 from fogml.twin.set_up import Sensors
 from fogml.twin.twin_file import load_twin
@@ -65,12 +66,12 @@ def test_information_is_that_of_the_replay_and_the_dense_covariance(rehearsed):
     ladder = NOISE.ladder(rows.row_s, STANDARD.noise.longest_runs * span)
     dense = NOISE.covariance(rows.end_s, rows.row_s, ladder)
     slopes = np.array(slopes)
-    expected = slopes @ np.linalg.solve(dense, slopes.T)
-    size = np.sqrt(np.diag(expected))
+    exact = slopes @ np.linalg.solve(dense, slopes.T)
+    size = np.sqrt(np.diag(exact))
     white = responses(rehearsal, of)
     found = white.T @ white
     # Windows of DeltaT are integrals there and sums of samples in a replay.
-    np.testing.assert_allclose(found / np.outer(size, size), expected / np.outer(size, size), atol=0.04)
+    np.testing.assert_allclose(found / np.outer(size, size), exact / np.outer(size, size), atol=0.04)
     names = [of.parameters[i].name for i in of.wanted]
     assert names == [
         "k1",
@@ -93,6 +94,33 @@ def test_merits_are_those_of_the_covariance(rehearsed):
     # Two runs alike tell twice as much, the priors apart.
     twice = information(Together([rehearsal, rehearsal]), of) - of.prior_information()
     np.testing.assert_allclose(twice, 2.0 * (info - of.prior_information()), rtol=1e-9)
+
+
+def test_expected_errors_are_those_of_fits_whose_prior_is_the_plan(rehearsed):
+    """Widths drawn about the plan's; outputs and fits in plain least squares, beside what is always off."""
+    on, rehearsal = rehearsed
+    of = unknowns(on, ["thermal_hysteresis"])
+    (at,) = of.effects
+    low, high = effect(at.id).shape[0].range("tactical")
+    rng, errors = np.random.default_rng(0), []
+    for _ in range(150):
+        width = at.shape["half_width"] * np.exp(0.5 * np.log(high / low) / 1.6449 * rng.standard_normal())
+        columns = responses(rehearsal, replace(of, effects=(replace(at, shape={"half_width": width}),)))
+        table = np.column_stack((columns, rehearsal.nuisances))
+        precision = np.append(np.diag(of.prior_information()), np.ones(rehearsal.nuisances.shape[1]))
+        true = rng.standard_normal(table.shape[1])
+        true[of.wanted[0]], true[of.wanted[1]] = (
+            0.0,
+            (width - at.shape["half_width"]) / of.parameters[-1].scale,
+        )
+        output = table @ true + rng.standard_normal(len(table))
+        fit = np.linalg.solve(table.T @ table + np.diag(precision), table.T @ output)
+        errors.append((fit - true)[list(of.wanted)])
+    promised = np.sqrt(np.diag(expected(rehearsal, of)))[list(of.wanted)]
+    np.testing.assert_allclose(promised, np.sqrt(np.mean(np.square(errors), axis=0)), rtol=0.15)
+    # At the plan's own width it would be less.
+    alone = np.sqrt(np.linalg.inv(information(rehearsal, of))[-1, -1])
+    assert promised[1] > 1.2 * alone
 
 
 def test_a_plan_promises_what_it_finds_and_repeats():

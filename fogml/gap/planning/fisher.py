@@ -1,17 +1,21 @@
 """What runs tell of constants and effects: Fisher information, and the standard errors that follow.
 
 With whitened responses J of the output to all unknowns and normal priors of precision P the information is
-``J'J + P``, its inverse the covariance that a fit of all unknowns together expects.
+``J'J + P``, its inverse V the covariance that a fit of all unknowns together expects. J is that at one shape
+of each effect; the truth has another, which the prior draws towards the one planned with. Where that is off
+by d the squared errors are ``V + V (P d d' P - P) V``, V at the truth; promised is their mean over shapes as
+the catalogue spreads them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.special import ndtri
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, did_you_mean
@@ -19,13 +23,15 @@ from fogml.gap.model import EffectValue
 from fogml.gap.planning.rehearsal import ExpectedRuns, Stage
 from fogml.intervals import Z90
 from fogml.twin.effect import Effect, NoiseEffect
-from fogml.twin.quantities import Quantity
+from fogml.twin.quantities import Grade, Quantity
 from fogml.twin.registry import effect
 
 Criterion = Literal["D", "A"]
 _SHAPE_STEP = 0.01
 _FLAT = 1e-12
 """Precision of an amplitude's prior in usual sizes: it may be anything."""
+_SHAPES = 16
+"""Shapes that errors are averaged over: as few as tell a mean square to a few per cent."""
 UNSEEN = 1e5
 """A standard error of this many usual sizes is none."""
 
@@ -177,6 +183,51 @@ def covariance(info: FloatArray) -> FloatArray:
     root = 1.0 / np.sqrt(np.diag(info))
     inverse = np.linalg.inv(info * np.outer(root, root))
     return np.asarray(0.5 * (inverse + inverse.T) * np.outer(root, root))
+
+
+def expected(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
+    """Expected mean squares and products of a fit's errors, in scales, shape (p, p); over shapes as usual."""
+    held = {(one.id, name): value for one in of.effects for name, value in one.shape.items()}
+    if not held:
+        return covariance(information(rehearsal, of))
+    place = {p.name: i for i, p in enumerate(of.parameters)}
+    prior = np.diag(of.prior_information())
+    spreads = {key: _spread(effect(key[0]), key[1], rehearsal.stage.model.grade) for key in held}
+    total = np.zeros((len(prior), len(prior)))
+    for deviates in ndtri(_even_shares(_SHAPES, len(held))):
+        true, pull = dict(held), np.zeros_like(total)
+        for (key, value), z in zip(held.items(), deviates, strict=True):
+            i, (factor, sd, limits) = place[".".join(key)], spreads[key]
+            true[key] = float(np.clip(value * math.exp(factor * z) + sd * z, *limits))
+            if factor:
+                # Of a normal one the mean square off the plan is the prior's, and nothing is left.
+                off = (true[key] - value) / of.parameters[i].scale
+                pull[i, i] = (prior[i] * off) ** 2 - prior[i]
+        shapes = [replace(one, shape={n: true[one.id, n] for n in one.shape}) for one in of.effects]
+        found = covariance(information(rehearsal, replace(of, effects=tuple(shapes))))
+        total += found + found @ pull @ found
+    return total / _SHAPES
+
+
+def _spread(declared: Effect, name: str, grade: Grade) -> tuple[float, float, tuple[float, float]]:
+    """Of a shape by its prior: deviation of the logarithm or of itself, the other 0; and its limits."""
+    (quantity,) = (one for one in declared.shape if one.name == name)
+    low, high = quantity.range(grade)
+    if low > 0.0:
+        return 0.5 * math.log(high / low) / Z90, 0.0, quantity.limits
+    return 0.0, _shape_sd(quantity, low, high), quantity.limits
+
+
+def _even_shares(count: int, wide: int) -> FloatArray:
+    """Points that fill a unit cube evenly, shape (count, wide): multiples of the generalised golden ratio.
+
+    M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
+    """
+    root = 1.5
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (wide + 1.0))
+    steps = root ** -np.arange(1.0, wide + 1.0)
+    return np.asarray((0.5 + np.arange(count)[:, None] * steps) % 1.0)
 
 
 def merit(info: FloatArray, wanted: Sequence[int], criterion: Criterion) -> float:

@@ -17,7 +17,7 @@ from fogml.gap.planning.fisher import (
     UNSEEN,
     Criterion,
     Unknowns,
-    covariance,
+    expected,
     information,
     merit,
     unknowns,
@@ -77,7 +77,7 @@ class _Goal:
             separations.append(Separation(tuple(m.value.id for m in group), float(apart), pairs))
         if self.of is None:
             return Outlook((), np.zeros((0, 0)), tuple(separations))
-        block = covariance(information(rehearsed, self.of))[np.ix_(self.of.wanted, self.of.wanted)]
+        block = expected(rehearsed, self.of)[np.ix_(self.of.wanted, self.of.wanted)]
         deviations = np.sqrt(np.diag(block))
         errors = tuple(
             ExpectedError(p.name, p.unit, p.value, p.prior, float(d) * p.scale if d < UNSEEN else None)
