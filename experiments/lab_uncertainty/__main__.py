@@ -15,6 +15,7 @@ from experiments.lab_uncertainty import (
     floors,
     joint,
     lines,
+    misalignment,
     models,
     monitor,
     north,
@@ -52,6 +53,14 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         200,
         "Before, a lag of 1 s put the scale factor off by 128 ppm. A threshold is told at two "
         "standard errors.",
+    ),
+    (
+        "Misalignment in four states (`lab misalignment`)",
+        misalignment,
+        100,
+        "Intervals of 95 %. Four tilts, rates of 10, 50 and 100 deg/s either way, 4 h at 1 Hz, Earth rate, a "
+        "fixture off by up to 0.3 deg. A drift of the scale factor that is too small to show is in no "
+        "interval.",
     ),
     (
         "Deviations on certificates and in acceptance",

@@ -15,12 +15,13 @@ University), with a constant column over the tilts for a fixture that is tilted 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.lab.misalignment_drift import drift_words, scale_drift
 from fogml.lab.misalignment_errors import (
     ROUND_OFF,
     Region,
@@ -29,11 +30,12 @@ from fogml.lab.misalignment_errors import (
     covariance_of,
     errors_of,
     slope_noise,
+    weights_of,
 )
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, check_order, sense_of, solve
 from fogml.signals.distributions import variances_sf
 
-_CROSS_TILT_TEST = 0.01
+_CROSS_TILT_TEST = _DRIFT_TEST = 0.01
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ class TableMeasurements:
         the reference axis [deg].
     synthetic
         Whether they come from a simulation.
+    place
+        When they were measured, in any unit that increases evenly; None where no one says.
     """
 
     state: FloatArray
@@ -69,6 +73,7 @@ class TableMeasurements:
     source: str = "measurements"
     state_angles_deg: Sequence[float] = DOCUMENT_ANGLES_DEG
     synthetic: bool = False
+    place: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -104,6 +109,9 @@ class Misalignment:
     order_p
         Probability that the states disagree as much as they do under the stated order of their turns by
         chance; None where no noise is known.
+    scale_drift_ppm, scale_drift_se_ppm
+        Change of the scale factor over the test and its standard error, where the data show one; then K is
+        the mean over the test.
     notes
         What to mind.
     """
@@ -123,6 +131,8 @@ class Misalignment:
     rate_noise: float | None
     tilt_noise: float | None
     order_p: float | None
+    scale_drift_ppm: float | None = None
+    scale_drift_se_ppm: float | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -147,21 +157,29 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
     slopes = {state: _slopes(measured, state) for state in STATES}
     for state in STATES:
         _check_tilts(measured.source, state, slopes[state].tilts, bool(cross_tilt))
+    many = all(len(np.unique(one.tilts)) > 3 for one in slopes.values())
+    drift = scale_drift(slopes, angles_deg, many and cross_tilt is not False, _DRIFT_TEST)
+    if drift is not None:
+        slopes = {
+            state: replace(one, values=one.values / grown)
+            for (state, one), grown in zip(slopes.items(), drift.grown, strict=True)
+        }
     if cross_tilt is None:
         cross_tilt = _shows_cross_tilt(slopes)
     fits = tuple(_fit(state, slopes[state], cross_tilt) for state in STATES)
     c = np.array([fit.coefficients[:2] for fit in fits])
-    rate_noise, tilt_noise, variances, dof, notes = slope_noise(slopes, fits)
-    order_p, doubts = check_order(c, _weights(fits, variances), angles_deg, dof, measured.source)
-    alike = _weights(fits, None)
+    rate_noise, tilt_noise, variances, dof, notes = slope_noise(slopes, fits, 0 if drift is None else 2)
+    order_p, doubts = check_order(c, weights_of(fits, variances), angles_deg, dof, measured.source)
+    alike = weights_of(fits, None)
     values, gradient = solve(c, alike, angles_deg)
     se, region = None, None
     intervals: dict[str, tuple[float, float]] = {}
     covariance = None
     if variances is not None:
-        covariance = covariance_of(gradient, fits, variances)
+        covariance = covariance_of(gradient, fits, variances, drift)
         se, intervals, region = errors_of(values, covariance, dof)
-    across, more = _cross_tilt_angle(fits, values, covariance) if cross_tilt else (None, ())
+    doubt = "" if drift is None else ", or the scale factor drifts unevenly"
+    across, more = _cross_tilt_angle(fits, values, covariance, doubt) if cross_tilt else (None, ())
     return Misalignment(
         K=float(values[0]),
         delta_x_deg=float(values[1]),
@@ -178,7 +196,9 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
         rate_noise=rate_noise,
         tilt_noise=tilt_noise,
         order_p=order_p,
-        notes=(*doubts, *notes, *more, *_reversed(values), sense_of(angles_deg)),
+        scale_drift_ppm=None if drift is None else 1e6 * drift.share,
+        scale_drift_se_ppm=None if drift is None else 1e6 * drift.se,
+        notes=(*doubts, *notes, *more, *drift_words(drift), *_reversed(values), sense_of(angles_deg)),
     )
 
 
@@ -230,7 +250,14 @@ def _slopes(measured: TableMeasurements, state: int) -> Slopes:
     level = np.where(single, 0.0, mean_output)
     residuals = output - level[group] - values[group] * centred
     dof = int((count - np.where(single, 1.0, 2.0)).sum())
-    return Slopes(tilts, values, float(residuals @ residuals), dof, float(np.mean(1.0 / spread)))
+    if measured.place is None:
+        places = np.full(len(tilts), np.nan)
+    else:
+        first, last = float(measured.place.min()), float(measured.place.max())
+        # Of a slope each turn tells as much as its rate is off the mean.
+        middle = sums(centred * rate * measured.place[chosen]) / sums(centred * rate)
+        places = (middle - 0.5 * (first + last)) / ((last - first) or 1.0)
+    return Slopes(tilts, values, places, float(residuals @ residuals), dof, float(np.mean(1.0 / spread)))
 
 
 def _check_tilts(source: str, state: int, tilts: FloatArray, cross_tilt: bool) -> None:
@@ -278,25 +305,13 @@ def _shows_cross_tilt(slopes: Mapping[int, Slopes]) -> bool:
     return variances_sf(ratio, len(wide), dof) < _CROSS_TILT_TEST
 
 
-def _weights(fits: tuple[StateFit, ...], variances: tuple[FloatArray, ...] | None) -> FloatArray:
-    """Square roots of the information on each state's c_c and c_s, shape (4, 2, 2).
-
-    Without variances that of round-off.
-    """
-    roots = []
-    floor = (ROUND_OFF * max(float(np.abs(fit.slopes).max()) for fit in fits)) ** 2
-    for i, fit in enumerate(fits):
-        solver = np.linalg.pinv(fit.design)[:2]
-        noise = floor if variances is None else np.maximum(variances[i], floor)
-        roots.append(np.linalg.cholesky(np.linalg.inv((solver * noise) @ solver.T)).T)
-    return np.array(roots)
-
-
 def _cross_tilt_angle(
-    fits: tuple[StateFit, ...], values: FloatArray, covariance: FloatArray | None
+    fits: tuple[StateFit, ...], values: FloatArray, covariance: FloatArray | None, doubt: str = ""
 ) -> tuple[float | None, tuple[str, ...]]:
     """Size of the fixture's tilt across: the constants of opposite states differ by 2 K sin f a_x or a_y."""
-    note = "a fixture tilted across by f shows; K is low by the factor cos f, the misalignment is not touched"
+    note = (
+        f"a fixture tilted across by f shows{doubt}; K is low by the factor cos f, the misalignment is right"
+    )
     constants = np.array([fit.coefficients[2] for fit in fits])
     size = np.hypot(constants[0] - constants[1], constants[2] - constants[3]) / 2.0
     lever = values[0] * np.sin(np.radians(values[3]))

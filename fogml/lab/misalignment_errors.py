@@ -49,25 +49,47 @@ class Region:
 
 @dataclass(frozen=True)
 class Slopes:
-    """Slopes of one state over its tilts, arrays of shape (m,), and what the lines over the rates left."""
+    """Slopes of one state over its tilts, arrays of shape (m,), and what the lines over the rates left.
+
+    ``places`` is when they were measured, from -1/2 at the test's begin to 1/2 at its end; NaN if not known.
+    """
 
     tilts: FloatArray
     values: FloatArray
+    places: FloatArray
     squares: float
     dof: int
     inverse_spread: float
 
 
+@dataclass(frozen=True)
+class ScaleDrift:
+    """Change of the scale factor over the test, as a share of it, its standard error, and what tells it.
+
+    State by state: how much the scale factor is `grown` at each slope, shape (m,), derivatives of the drift's
+    terms `by_slopes`, shape (k, m), and what a unit of each term `moves` the slopes by, shape (m, k).
+    """
+
+    share: float
+    se: float
+    grown: tuple[FloatArray, ...]
+    by_slopes: tuple[FloatArray, ...]
+    moves: tuple[FloatArray, ...]
+
+
 def slope_noise(
-    slopes: Mapping[int, Slopes], fits: tuple[StateFit, ...]
+    slopes: Mapping[int, Slopes], fits: tuple[StateFit, ...], taken: int = 0
 ) -> tuple[float | None, float | None, tuple[FloatArray, ...] | None, int, tuple[str, ...]]:
-    """Noise of a slope by the rates and by the tilts, the variances to use, its degrees of freedom, notes."""
+    """Noise of a slope by the rates and by the tilts, the variances to use, its degrees of freedom, notes.
+
+    So many degrees of freedom of the tilts are `taken` by what was fitted before.
+    """
     dof_rates = sum(s.dof for s in slopes.values())
     per_output = sum(s.squares for s in slopes.values()) / dof_rates if dof_rates else None
     by_rates = (
         per_output * float(np.mean([s.inverse_spread for s in slopes.values()])) if per_output else None
     )
-    dof_tilts = sum(len(fit.residuals) - fit.design.shape[1] for fit in fits)
+    dof_tilts = max(sum(len(fit.residuals) - fit.design.shape[1] for fit in fits) - taken, 0)
     by_tilts = sum(float(fit.residuals @ fit.residuals) for fit in fits) / dof_tilts if dof_tilts else None
     told = tuple(np.sqrt(v) if v is not None else None for v in (by_rates, by_tilts))
     if by_tilts is not None and dof_tilts >= _LEAST_DOF:
@@ -119,15 +141,35 @@ def _with_tilt_errors(fits: tuple[StateFit, ...], by_rates: float) -> tuple[Floa
     return tuple(by_rates + tilt_variance * squares for squares in steep)
 
 
+def weights_of(fits: tuple[StateFit, ...], variances: tuple[FloatArray, ...] | None) -> FloatArray:
+    """Square roots of the information on each state's c_c and c_s, shape (4, 2, 2).
+
+    Without variances that of round-off.
+    """
+    roots = []
+    floor = (ROUND_OFF * max(float(np.abs(fit.slopes).max()) for fit in fits)) ** 2
+    for i, fit in enumerate(fits):
+        solver = np.linalg.pinv(fit.design)[:2]
+        noise = floor if variances is None else np.maximum(variances[i], floor)
+        roots.append(np.linalg.cholesky(np.linalg.inv((solver * noise) @ solver.T)).T)
+    return np.array(roots)
+
+
 def covariance_of(
-    gradient: FloatArray, fits: tuple[StateFit, ...], variances: tuple[FloatArray, ...]
+    gradient: FloatArray,
+    fits: tuple[StateFit, ...],
+    variances: tuple[FloatArray, ...],
+    drift: ScaleDrift | None = None,
 ) -> FloatArray:
-    """Covariance of values with a gradient by the states' coefficients, shape (v, 4, 2): shape (v, v)."""
-    covariance = np.zeros((len(gradient), len(gradient)))
-    for i, (fit, variance) in enumerate(zip(fits, variances, strict=True)):
-        by_slopes = gradient[:, i] @ np.linalg.pinv(fit.design)[:2]
-        covariance += (by_slopes * variance) @ by_slopes.T
-    return covariance
+    """Covariance of values with a gradient by the states' coefficients, shape (v, 4, 2): shape (v, v).
+
+    A drift of the scale factor, told by the same slopes, was taken off them.
+    """
+    by_slopes = [gradient[:, i] @ np.linalg.pinv(fit.design)[:2] for i, fit in enumerate(fits)]
+    if drift is not None:
+        by_drift = sum(one @ moves for one, moves in zip(by_slopes, drift.moves, strict=True))
+        by_slopes = [one - by_drift @ told for one, told in zip(by_slopes, drift.by_slopes, strict=True)]
+    return np.asarray(sum((one * v) @ one.T for one, v in zip(by_slopes, variances, strict=True)))
 
 
 def errors_of(

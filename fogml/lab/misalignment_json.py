@@ -149,6 +149,8 @@ def misalignment_json(measured: TableMeasurements, cross_tilt: bool | None = Non
         },
         "cross_tilt": found.cross_tilt,
         "cross_tilt_deg": found.cross_tilt_deg,
+        "scale_drift_ppm": found.scale_drift_ppm,
+        "scale_drift_se_ppm": found.scale_drift_se_ppm,
         "slope_noise": {"by_rates": found.rate_noise, "by_tilts": found.tilt_noise, "unit": per_rate},
         "state_angles_deg": list(measured.state_angles_deg),
         "order_p": found.order_p,

@@ -91,7 +91,10 @@ def from_marks(rows: Rows, segment: NDArray[np.str_]) -> TableMeasurements:
         )
         state, tilt, rate = unique[turned].T
         output = during - (before + after) / 2.0
-        return TableMeasurements(state, tilt, rate, output, rows.unit, rows.source, rows.state_angles_deg)
+        place = np.bincount(group[turn], np.flatnonzero(turn), len(unique))[turned] / counts[1][turned]
+        return TableMeasurements(
+            state, tilt, rate, output, rows.unit, rows.source, rows.state_angles_deg, place=place
+        )
     changes = turn[1:] != turn[:-1]
     # A rest's rate, where it states one, is its turn's and no setting of its own.
     changes |= turn[1:] & turn[:-1] & (np.diff(rows.rate_deg_s) != 0.0)
@@ -227,4 +230,5 @@ def _measured(rows: Rows, chunks: _Chunks) -> TableMeasurements:
         rows.unit,
         rows.source,
         rows.state_angles_deg,
+        place=chunks.place[turns] + 0.5 * chunks.count[turns],
     )

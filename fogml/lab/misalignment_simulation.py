@@ -95,7 +95,15 @@ def measurements(
     output = unit.K * rate * np.sum(axes * unit.table_axis(set_tilt), axis=-1)
     output += noise * random.standard_normal(len(output))
     return TableMeasurements(
-        state, tilt, rate, output, output_unit, "synthetic", tuple(state_angles_deg), synthetic=True
+        state,
+        tilt,
+        rate,
+        output,
+        output_unit,
+        "synthetic",
+        tuple(state_angles_deg),
+        synthetic=True,
+        place=np.arange(float(len(output))),
     )
 
 

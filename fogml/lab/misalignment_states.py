@@ -47,7 +47,7 @@ def solve(c: FloatArray, weights: FloatArray, angles_deg: Sequence[float]) -> tu
     InputError
         If the turns of the states do not tell both components.
     """
-    parts = _pairs(angles_deg)
+    parts = pairs_of(angles_deg)
     found, jacobian, _ = _fitted(c, weights, angles_deg, parts)
     axis, errors = found[:3], found[3:]
     k = float(np.linalg.norm(axis))
@@ -67,7 +67,7 @@ def solve(c: FloatArray, weights: FloatArray, angles_deg: Sequence[float]) -> tu
     return np.array([k, *np.degrees(angles)]), np.asarray(gradient)
 
 
-def _pairs(angles_deg: Sequence[float]) -> FloatArray:
+def pairs_of(angles_deg: Sequence[float]) -> FloatArray:
     """Which zero error each state has: one of those along x, one of those along y, where both have two."""
     turns = np.radians(np.asarray(angles_deg, dtype=np.float64))
     along_y = np.abs(np.sin(turns)) > np.abs(np.cos(turns))

@@ -271,3 +271,41 @@ def test_what_is_even_in_the_rate_is_neither_slope_nor_left_over() -> None:
     found = _slopes(measured, 1)
     assert found.values == pytest.approx([2.0])
     assert (found.squares, found.dof) == (pytest.approx(0.0, abs=1e-20), 3)
+
+
+def drifting(seed: int, ppm: float = 0.0, cross_deg: float = 0.0, noise: float = 1e-6) -> TableMeasurements:
+    """The printed equations' case, turn after turn, K growing by `ppm` over the test, ever more slowly."""
+    steady = by_the_formulas(cross_deg=cross_deg)
+    place = np.arange(float(len(steady.output)))
+    warm = (1.0 - np.exp(-place / place[-1])) / (1.0 - np.exp(-1.0))
+    grown = 1.0 + 1e-6 * ppm * (warm - warm.mean())
+    random = np.random.default_rng(seed)
+    output = steady.output * grown + noise * 1.2345 * 100.0 * random.standard_normal(len(place))
+    return replace(steady, output=output, place=place)
+
+
+def test_a_scale_factor_that_drifts_is_no_misalignment_and_no_tilt_of_the_fixture() -> None:
+    """By 50 ppm over the test, as by 10 ppm/degC over 5 degC: before, intervals held no truth."""
+    held, order = np.zeros(3), []
+    for seed in range(60):
+        found = decouple(drifting(seed, 50.0))
+        assert found.scale_drift_ppm is not None
+        assert not found.cross_tilt or any("drifts unevenly" in note for note in found.notes)
+        assert found.scale_drift_se_ppm is not None
+        order.append((found.scale_drift_ppm - 50.0) / found.scale_drift_se_ppm)
+        for i, (name, true) in enumerate([("K", 1.2345), ("delta_x_deg", 5.0), ("delta_y_deg", 3.0)]):
+            low, high = found.intervals[name]
+            held[i] += low <= true <= high
+    assert np.all(held >= 51), held  # of 60 intervals of 95 %, 51 or more hold but once in 1000
+    assert np.sum(np.abs(order) < 2.57) >= 51  # Student's t with the 5 degrees of freedom that are left
+    assert any("drifts by" in note and "mean over the test" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("cross_deg", [0.0, 0.3])
+def test_no_drift_is_told_of_a_steady_scale_factor(cross_deg: float) -> None:
+    found = [decouple(drifting(seed, cross_deg=cross_deg)) for seed in range(60)]
+    # One in a hundred by chance.
+    assert sum(one.scale_drift_ppm is not None for one in found) <= 4
+    assert sum(one.cross_tilt for one in found) in (range(5) if cross_deg == 0.0 else [60])
+    # Where no one says when turns were, nothing can be told.
+    assert decouple(replace(drifting(0, 50.0), place=None)).scale_drift_ppm is None
