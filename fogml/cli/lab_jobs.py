@@ -57,7 +57,7 @@ def _print_misalignment(values: dict[str, Any], terminal: Terminal) -> None:
     rows = [
         [
             m["name"],
-            f"{m['K']:.9g}",
+            "–" if m["K"] is None else f"{m['K']:.9g}",
             *(number(m[key]) for key in ("K_difference_ppm", "delta_x_deg", "delta_y_deg")),
         ]
         for m in values["methods"]
@@ -70,9 +70,14 @@ def _print_misalignment(values: dict[str, Any], terminal: Terminal) -> None:
 
 def _figures(value: float, error: float | None, ends: list[float] | None) -> list[str]:
     """Value, standard error and interval, to the first digit of the standard error."""
-    places = 6 if not error else max(-math.floor(math.log10(error)), 0)
-    told = [f"{end:.{places}f}" for end in ends] if ends else ["–", "–"]
-    return [f"{value:.{places}f}", "–" if error is None else f"{error:.2g}", *told]
+
+    def told(figure: float) -> str:
+        # 0.0 is added as a zero has no sign.
+        return f"{round(figure, places) + 0.0:.{places}f}" if error else f"{figure:.7g}"
+
+    places = max(-math.floor(math.log10(error)), 0) if error else 0
+    shown = [told(end) for end in ends] if ends else ["–", "–"]
+    return [told(value), "–" if error is None else f"{error:.2g}", *shown]
 
 
 def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:

@@ -149,8 +149,8 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
     Raises
     ------
     InputError
-        If a state is missing, a state's tilts do not tell sine from cosine, or the data contradict the
-        order of the states' turns.
+        If a state is missing, a state's tilts do not tell sine from cosine, the output does not follow the
+        table rate, or the data contradict the order of the states' turns.
     """
     check_states(measured)
     angles_deg = tuple(float(angle) for angle in measured.state_angles_deg)

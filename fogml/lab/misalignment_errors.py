@@ -147,7 +147,9 @@ def weights_of(fits: tuple[StateFit, ...], variances: tuple[FloatArray, ...] | N
     Without variances that of round-off.
     """
     roots = []
-    floor = (ROUND_OFF * max(float(np.abs(fit.slopes).max()) for fit in fits)) ** 2
+    largest = max(float(np.abs(fit.slopes).max()) for fit in fits)
+    # An output that stands still has slopes of 0; any floor does then.
+    floor = (ROUND_OFF * (largest or 1.0)) ** 2
     for i, fit in enumerate(fits):
         solver = np.linalg.pinv(fit.design)[:2]
         noise = floor if variances is None else np.maximum(variances[i], floor)

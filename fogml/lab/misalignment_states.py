@@ -125,6 +125,16 @@ def _fitted(
     return values, whitened(jacobian), float(left @ left)
 
 
+def _check_follows(c: FloatArray, weights: FloatArray, dof: int, source: str, chance: float = 0.01) -> None:
+    """Hold that the slopes are more than noise alone makes in a share `chance` of cases (F test)."""
+    white = np.einsum("jab,jb->ja", weights, c)
+    if variances_sf(float(np.mean(white**2)), c.size, dof or np.inf) > chance:
+        raise InputError(
+            f"{source}, column 'output': it does not follow the table rate, its slopes can't be told from 0; "
+            "check which column is the output, and that the gyro was on"
+        )
+
+
 def check_order(
     c: FloatArray,
     weights: FloatArray,
@@ -162,7 +172,13 @@ def check_order(
         Of the states' disagreement under the stated order; None where no noise is known.
     notes
         What to mind.
+
+    Raises
+    ------
+    InputError
+        If the output does not follow the table rate, or the turns contradict the order of the states.
     """
+    _check_follows(c, weights, dof, source)
     common = np.ones((len(STATES), 1))
     redundant = 2 * len(STATES) - 4
 

@@ -76,6 +76,14 @@ def test_misalignment_without_constant(turns: Path, invoke_json) -> None:
     assert invoke_json("lab", "misalignment", turns, "--no-cross-tilt")["cross_tilt"] is False
 
 
+def test_misalignment_without_the_upright_tilt(turns: Path, invoke) -> None:
+    """The classical test needs tilt 0; without it the four states still tell, and have a dash beside them."""
+    lines = turns.read_text().splitlines()
+    turns.write_text("\n".join(line for line in lines if line.split(",")[1] != "0") + "\n")
+    printed = invoke("lab", "misalignment", turns).stdout
+    assert "classical test" in printed and "1.2345" in printed and "-0.0" not in printed
+
+
 def test_north_of_a_recording(positions: Path, tmp_path: Path, invoke, invoke_json) -> None:
     told = invoke_json("lab", "north", "--positions", positions)
     assert told["schema"] == "fogml.north/1" and set(NORTH_KEYS) <= set(told)

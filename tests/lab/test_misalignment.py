@@ -309,3 +309,13 @@ def test_no_drift_is_told_of_a_steady_scale_factor(cross_deg: float) -> None:
     assert sum(one.cross_tilt for one in found) in (range(5) if cross_deg == 0.0 else [60])
     # Where no one says when turns were, nothing can be told.
     assert decouple(replace(drifting(0, 50.0), place=None)).scale_drift_ppm is None
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_an_output_that_does_not_follow_the_rate_has_no_scale_factor(noise: float) -> None:
+    turns = by_the_formulas()
+    output = noise * np.random.default_rng(5).standard_normal(len(turns.output))
+    with pytest.raises(InputError, match="column 'output': it does not follow the table rate"):
+        decouple(replace(turns, output=output))
+    following = replace(turns, output=turns.output + 0.1 * output)
+    assert pytest.approx(1.2345, rel=0.01) == decouple(following).K
