@@ -116,7 +116,7 @@ def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
     Raises
     ------
     InputError
-        If time does not increase, or nothing turns.
+        If time does not increase, nothing turns, or no turn lasts until table and gyro have settled.
     """
     back = np.diff(time) <= 0.0
     if back.any():
@@ -131,6 +131,11 @@ def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
             f"{rows.source}, column 'rate': the table never turns; turns both ways were expected"
         )
     kept = ~transition_mask(run)
+    if not (kept & ~rest).any():
+        raise InputError(
+            f"{rows.source}, column 'time': every turn is over before table and gyro have settled, and what is "
+            "about a change of rate is cut; turn for longer, or give averages with a column 'segment'"
+        )
     setting = (np.diff(rows.state) != 0.0) | (np.diff(rows.tilt_deg) != 0.0)
     changes = setting | (rest[1:] != rest[:-1]) | (kept[1:] != kept[:-1])
     changes |= ~rest[1:] & ~rest[:-1] & (np.sign(rows.rate_deg_s[1:]) != np.sign(rows.rate_deg_s[:-1]))

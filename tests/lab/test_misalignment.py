@@ -319,3 +319,9 @@ def test_an_output_that_does_not_follow_the_rate_has_no_scale_factor(noise: floa
         decouple(replace(turns, output=output))
     following = replace(turns, output=turns.output + 0.1 * output)
     assert pytest.approx(1.2345, rel=0.01) == decouple(following).K
+
+
+def test_turns_too_short_to_settle_are_told() -> None:
+    rows, time = samples(UNIT, TILTS, (36.0,), turn_s=4.0)
+    with pytest.raises(InputError, match="column 'time': every turn is over before table and gyro"):
+        from_samples(rows, time)
