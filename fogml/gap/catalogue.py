@@ -67,10 +67,10 @@ def _driving(
 
 def moisture(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """What follows the air's humidity late, alike at all temperatures or not."""
-    if "humidity" not in rows.even.drives:
+    if not any(scene.records("humidity")):
         yield Block(np.zeros((len(rows), 1)))
         return
-    air = rows.even.drives["humidity"]
+    air = rows.even.drive("humidity")
     taken = {s: rows.of(air - lag(rows.even.time, air, s)) for s in scene.grids.moisture_s}
     warm = 0.03 * (rows.temperature - 25.0)
     for values in taken.values():
@@ -90,16 +90,18 @@ def power_cycles(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Blo
 def machines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """Duties of the chamber's machines that are recorded, with short lags; else a line of two harmonics."""
     grids = scene.grids
-    recorded = [n for n in ("heater", "compressor") if n in rows.even.drives]
-    if not recorded:
+    told = {n: scene.records(n) for n in ("heater", "compressor")}
+    if not all(any(by_run) for by_run in zip(*told.values())):
         shortest, longest = grids.cycle_s
         yield from _lines(rows, scene, 2, 1.0 / longest, 1.0 / shortest)
+    recorded = [n for n, by_run in told.items() if any(by_run)]
+    if not recorded:
         return
-    duty = np.asarray(sum(rows.even.drives[n] for n in recorded))
+    duty = np.asarray(sum(rows.even.drive(n) for n in recorded))
     behind = [rows.of(lag(rows.even.time, duty, s)) for s in grids.machine_lags_s]
     for values, s in zip(behind, grids.machine_lags_s):
         yield column_block(values, lag=s)
-    yield column_block(*(rows.of(rows.even.drives[n]) for n in recorded))
+    yield column_block(*(rows.of(rows.even.drive(n)) for n in recorded))
     yield column_block(*behind)
 
 
@@ -174,8 +176,8 @@ def other_plant(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Bloc
     told, time = slopes(rows, constants), rows.even.time
     held = {n: rows.even.temperatures[n] for n in rows.readings if n in READ}
     errors = [{n: lag(time, v, s) - v for n, v in held.items()} for s in scene.grids.plant_lags_s]
-    if "T_out" in held:
-        errors.append({n: held["T_out"] - v for n, v in held.items()})
+    if any(scene.records("T_out")):
+        errors.append({n: rows.even.temperature("T_out") - v for n, v in held.items()})
     columns = [through_nominal(rows, told, e) for e in errors]
     yield column_block(*columns, rows.of(rate(time, rows.even.temperature("T_out"))))
 

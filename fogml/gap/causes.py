@@ -81,6 +81,8 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
     by_run = [[b.columns for b in islice(build(r, scene, setting.values), most)] for r in scene.fit]
     stacked = field.whitening.stacked([np.concatenate(columns, axis=1) for columns in by_run])
     gains, values, spreads = [], [], []
+    limits = declared.amplitude.limits
+    largest = max(map(abs, limits))
     at = 0
     for i, first in enumerate(by_run[0]):
         width, node = first.shape[1], nodes[i % len(nodes)]
@@ -91,7 +93,9 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
         scales = np.outer(scale, scale)
         inverse = np.linalg.pinv(gram / scales, rcond=1e-6, hermitian=True) / scales
         coefficients = inverse @ fits
-        gains.append(0.5 * float(fits @ coefficients) - width)
+        # Below a standard deviation at the greatest amplitude that there is, a form says nothing.
+        seen = float(np.trace(gram)) * largest**2 >= 1.0
+        gains.append(0.5 * float(fits @ coefficients) - width if seen else -1e300)
         values.append(_value(declared, node, node.mix @ coefficients))
         spreads.append(node.mix @ inverse @ node.mix.T)
     best = int(np.argmax(gains))
@@ -100,7 +104,8 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
     se = math.sqrt(max(float(ones @ spreads[best] @ ones), 0.0))
     weights = np.exp(np.clip(np.array(gains) - max(gains), -50.0, 0.0))
     weights /= weights.sum()
-    sizes = np.array([a for a, _ in values])
+    sizes = np.clip([a for a, _ in values], -largest, largest)
+    amplitude = float(np.clip(amplitude, -largest, largest))
     form = setting.priors.form_error * amplitude
     se = math.sqrt(se**2 + float(weights @ (sizes - amplitude) ** 2) + form**2)
     shape_se = {
@@ -112,7 +117,7 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
         amplitude = abs(amplitude)
     if getattr(declared, "digitises", False):
         amplitude, se = _step(scene.fit, amplitude, se)
-    amplitude = float(np.clip(amplitude, *declared.amplitude.limits))
+    amplitude = float(np.clip(amplitude, *limits))
     return Card(EffectValue(id, amplitude, shape), se, shape_se)
 
 

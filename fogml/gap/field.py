@@ -60,7 +60,7 @@ class Columns:
             by_run = [list(family.build(rows, scene, constants)) for rows in scene.runs]
             # Blocks whose weights add to less are the part of a grid that stands out.
             total = max(sum(b.weight for b in by_run[0]), 1.0)
-            for blocks in zip(*by_run):
+            for blocks in zip(*by_run, strict=True):
                 columns = [b.columns for b in blocks]
                 if family.drawn_per_run:
                     columns = apart(columns, scene.fitted)
@@ -116,6 +116,8 @@ class Field:
         kept = whole - np.sum((self.base.basis.T @ self.white) ** 2, axis=0)
         whole, kept = (np.add.reduceat(v, edges[:-1]) if picked else v for v in (whole, kept))
         shown = kept > np.maximum(setting.priors.noise.in_constants * whole, 1e-18)
+        # What would stay below a standard deviation at the greatest size that there is can't be seen.
+        shown &= kept >= np.array([self._largest(columns.nodes[i].family) for i in picked]) ** -2.0
         scales = np.where(shown, 1.0 / np.sqrt(np.where(shown, kept, 1.0)), 0.0)
         self.white *= np.repeat(scales, np.diff(edges))
         self.scale = {i: float(s) for i, s in zip(picked, scales) if s}
@@ -137,6 +139,22 @@ class Field:
         for m in members:
             held = held.beside(self.block(m.node), m.size)
         return held
+
+    def _largest(self, family: int) -> float:
+        """The greatest amplitude that a family's effect can have, infinite of what is none."""
+        declared = self.setting.scene.candidates.get(self.columns.families[family].id)
+        return math.inf if declared is None else max(map(abs, declared.amplitude.limits))
+
+    def usual_most(self, family: int) -> float:
+        """The greatest amplitude of the card's range, or of the family where it is of no card."""
+        held, scene = self.columns.families[family], self.setting.scene
+        known = held.kind == "known"
+        return scene.candidates[held.id].amplitude.range(scene.grade)[1] if known else held.largest
+
+    def shows(self, family: int, length: float) -> bool:
+        """Whether some form of a family reaches a whitened length within its usual range."""
+        most, nodes = self.usual_most(family), self.columns.nodes
+        return any(s * length <= most for i, s in self.scale.items() if nodes[i].family == family)
 
     def response(self, declared: Effect, shape: Mapping[str, float], amplitude: float = 1.0) -> FloatArray:
         """Whitened response of the fit runs to an effect of an amplitude, shape (n,)."""
@@ -254,13 +272,7 @@ class Blocks:
 
 def _range_penalties(held: Field, nodes: list[int], lengths: FloatArray) -> FloatArray:
     """Logarithm of how likely each node's sizes are by the card's or family's range, shape (nodes, sizes)."""
-    scene = held.setting.scene
-    highest = np.array(
-        [
-            scene.candidates[f.id].amplitude.range(scene.grade)[1] if f.kind == "known" else f.largest
-            for f in held.columns.families
-        ]
-    )[[held.columns.nodes[n].family for n in nodes]]
+    highest = np.array([held.usual_most(held.columns.nodes[n].family) for n in nodes])
     scales = np.array([held.scale[n] for n in nodes])
     over = np.log(np.maximum(scales[:, None] * lengths / highest[:, None], 1.0))
     return np.asarray(-0.5 * (over / math.log(held.setting.priors.beyond_range)) ** 2)

@@ -67,6 +67,10 @@ class Scene:
         """Fit runs."""
         return self.runs[: self.fitted]
 
+    def records(self, name: str) -> list[bool]:
+        """Whether each run records a temperature or a drive: a family has the same blocks on all of them."""
+        return [name in r.readings or name in r.even.drives for r in self.runs]
+
     @cached_property
     def range_degc(self) -> tuple[float, float]:
         """Least and greatest T of the fit runs."""

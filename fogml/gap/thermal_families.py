@@ -109,8 +109,8 @@ def _two_lags(rows: Rows, places: list[Place], lags_s: tuple[float, ...], sign: 
 def hidden_node(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """Places that lag behind what is recorded."""
     places = scene.coil(rows)
-    if "T_chamber" in rows.readings:
-        places.append(Place(rows.even.temperatures["T_chamber"], 1.0, "chamber air"))
+    if any(scene.records("T_chamber")):
+        places.append(Place(rows.even.temperature("T_chamber"), 1.0, "chamber air"))
     yield from _two_lags(rows, places, scene.grids.node_lags_s, 1.0)
 
 

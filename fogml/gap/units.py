@@ -155,7 +155,10 @@ class _Told:
     def __init__(self, found: Inference) -> None:
         self.found = found
         families = found.columns.families
-        self.families = {families[f].id: f for f in found.search.families_of("known")}
+        least = found.setting.priors.least_size
+        # Within its range a cause may be too small to be seen here, whatever it is in other units.
+        known = (f for f in found.search.families_of("known") if found.field.shows(f, least))
+        self.families = {families[f].id: f for f in known}
         self._scores: dict[frozenset[str], float] = {}
 
     def names(self, explanation: Explanation) -> frozenset[str]:
@@ -190,10 +193,20 @@ class _Told:
 
 
 def _by_others(others: Sequence[_Told], own: _Told) -> Callable[[frozenset[str]], float]:
-    """What other units say of a set, against what they say of the one that they find likeliest."""
+    """What other units say of a set, against what they say of the one that they find likeliest.
+
+    Causes that this unit can't show act as it suits the others.
+    """
     sets = {names for t in (*others, own) for names in t.sets}
-    best = max(sum(t.score(names) for t in others) for names in sets)
-    return lambda names: sum(t.score(names) for t in others) - best
+    said = {names: sum(t.score(names) for t in others) for names in sets}
+    best = max(said.values())
+
+    def score(names: frozenset[str]) -> float:
+        shown = names.intersection(own.families)
+        alike = [told for held, told in said.items() if held.intersection(own.families) == shown]
+        return max(alike, default=sum(t.score(names) for t in others)) - best
+
+    return score
 
 
 def _shared(by_unit: dict[str, Diagnosis], told: Sequence[_Told]) -> tuple[SharedCause, ...]:

@@ -133,8 +133,8 @@ def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
     kept = ~transition_mask(run)
     if not (kept & ~rest).any():
         raise InputError(
-            f"{rows.source}, column 'time': every turn is over before table and gyro have settled, and what is "
-            "about a change of rate is cut; turn for longer, or give averages with a column 'segment'"
+            f"{rows.source}, column 'time': every turn is over before table and gyro have settled (what is "
+            "about a change of rate is cut); turn for longer, or give averages with a column 'segment'"
         )
     setting = (np.diff(rows.state) != 0.0) | (np.diff(rows.tilt_deg) != 0.0)
     changes = setting | (rest[1:] != rest[:-1]) | (kept[1:] != kept[:-1])

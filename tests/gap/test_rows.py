@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fogml.gap.catalogue import power_cycles
+from fogml.gap.catalogue import machines, moisture, other_plant, power_cycles
 from fogml.gap.field import Columns
 from fogml.gap.frame import setting_of
 from fogml.gap.model import TwinModel
@@ -13,6 +13,7 @@ from fogml.gap.reading import rows_of
 from fogml.gap.reports import assumed
 from fogml.gap.scene import Family, Scene, steps_are_coarse
 from fogml.gap.settings import Priors
+from fogml.gap.thermal_families import hidden_node
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin_file import load_twin
@@ -105,3 +106,24 @@ def test_places_in_the_winding_are_its_middle_and_its_faces_and_none_outside():
     ]
     np.testing.assert_allclose(places[0], 0.5 * (inner + outer))
     assert len(places) == 3
+
+
+@pytest.mark.parametrize("poor_first", [False, True])
+def test_what_one_run_alone_records_keeps_its_place_beside_runs_that_do_not(poor_first):
+    """Each family has the same blocks on all runs; the rich run has those it has without the poor one."""
+    poor = _cycle("poor", seed=2)
+    hours = poor.time / 3600.0
+    more = {
+        "T_out": poor.columns["T"] + np.sin(7.0 * hours),
+        "T_chamber": poor.columns["T"] + 3.0 * np.sin(9.0 * hours),
+        "humidity": 50.0 + 20.0 * np.sin(5.0 * hours),
+        "heater": 0.5 + 0.5 * np.sin(30.0 * hours),
+    }
+    rich = Run.from_columns("rich", time=poor.time, gyro=_cycle().gyro, T_in=poor.columns["T"], **more)
+    alone, beside = (_scene(*runs) for runs in ((rich,), (poor, rich) if poor_first else (rich, poor)))
+    for build in (moisture, machines, hidden_node, other_plant):
+        family = Family("any", "known", build)
+        held, both = (Columns.of([family], scene, {"k1": 0.01}) for scene in (alone, beside))
+        own = both.by_run[1 if poor_first else 0]
+        # Beside a run that records no machine a line may be one, which comes first.
+        np.testing.assert_allclose(own[:, own.shape[1] - held.by_run[0].shape[1] :], held.by_run[0])

@@ -53,3 +53,14 @@ def test_units_that_are_not_told_or_have_no_run_to_fit_on_are_refused():
         diagnose_units(Simulator(), [run], [held])
     with pytest.raises(InputError, match="diagnose one unit at a time"):
         diagnose(Simulator(), [run, held])
+
+
+def test_a_unit_whose_runs_cannot_show_a_cause_says_nothing_of_it():
+    """Loud as its output is, it would take far more than a usual size to be seen: no such size is told."""
+    model, quiet = Simulator(offered=("bend", "creep")), _of("A", 0.6, 5)
+    loud = [run.with_columns(gyro=3e3 * run.gyro) for run in _of("B", 0.0, 6)]
+    found = diagnose_units(model, [*quiet, *loud])
+    assert [(cause.effect, list(cause.sizes)) for cause in found.shared] == [("bend", ["A"])]
+    (alone,) = diagnose_units(model, quiet).shared
+    assert found.shared[0].probability == pytest.approx(alone.probability, rel=1e-6)
+    assert not [f for f in found.by_unit["B"].named if f.effect == "bend"]
