@@ -81,21 +81,20 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
     by_run = [[b.columns for b in islice(build(r, scene, setting.values), most)] for r in scene.fit]
     stacked = field.whitening.stacked([np.concatenate(columns, axis=1) for columns in by_run])
     gains, values, spreads = [], [], []
-    limits = declared.amplitude.limits
-    largest = max(map(abs, limits))
+    largest = max(map(abs, declared.amplitude.limits))
     at = 0
     for i, first in enumerate(by_run[0]):
         width, node = first.shape[1], nodes[i % len(nodes)]
         columns = stacked[:, at : at + width]
         at += width
         gram, fits = beside.gram(columns), beside.fits(columns)
-        scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+        # What would stay below a standard deviation at the greatest amplitude that there is can't be told.
+        scale = np.sqrt(np.maximum(np.diagonal(gram), 0.0))
+        scale = np.where(scale * largest >= 1.0, scale, np.inf)
         scales = np.outer(scale, scale)
         inverse = np.linalg.pinv(gram / scales, rcond=1e-6, hermitian=True) / scales
         coefficients = inverse @ fits
-        # Below a standard deviation at the greatest amplitude that there is, a form says nothing.
-        seen = float(np.trace(gram)) * largest**2 >= 1.0
-        gains.append(0.5 * float(fits @ coefficients) - width if seen else -1e300)
+        gains.append(0.5 * float(fits @ coefficients) - width)
         values.append(_value(declared, node, node.mix @ coefficients))
         spreads.append(node.mix @ inverse @ node.mix.T)
     best = int(np.argmax(gains))
@@ -117,7 +116,7 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
         amplitude = abs(amplitude)
     if getattr(declared, "digitises", False):
         amplitude, se = _step(scene.fit, amplitude, se)
-    amplitude = float(np.clip(amplitude, *limits))
+    amplitude = float(np.clip(amplitude, *declared.amplitude.limits))
     return Card(EffectValue(id, amplitude, shape), se, shape_se)
 
 

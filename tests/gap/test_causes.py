@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from fogml.gap.causes import _step, agree, growth
+from fogml.gap.causes import _step, agree, card_of, growth
+from fogml.gap.inference import foreseen
+from fogml.gap.model import TwinModel
 from fogml.gap.result import RunAmplitude
 from fogml.gap.settings import STANDARD
+from fogml.runs.run import Run
 from fogml.runs.steps import to_steps
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.twin_file import load_twin
 
 
 def _sizes(*values, se=0.1):
@@ -50,3 +55,19 @@ def test_a_step_of_the_sensors_is_read_off_their_records():
     # A record that shows none leaves what was fitted.
     run.columns = {"T_in": course, "T_out": course}
     assert _step([SimpleNamespace(run=run)], 0.001, 0.002) == (0.001, 0.002)
+
+
+def test_a_form_that_the_runs_cannot_show_has_no_share_in_a_size():
+    """With the table at rest the sine of its angle is rounding: the cosine alone tells the size."""
+    time = 10.0 * np.arange(600)
+    temperature = 25.0 + 20.0 * np.sin(2.0 * np.pi * time / time[-1])
+    gyro = 0.1 * np.random.default_rng(1).standard_normal(600)
+    run = Run.from_columns(
+        "a", time=time, gyro=gyro, T_in=temperature, T_out=temperature + 0.4 * (time > 3e3)
+    )
+    field = foreseen(TwinModel(load_twin("nominal")), [run], NoiseModel(0.005, 0.0, 0.0), STANDARD).field
+    card = card_of("azimuthal_gradient", field, field.base, {})
+    column = field.response(field.setting.scene.candidates["azimuthal_gradient"], {"phase": 0.0})
+    size = float(field.base.fits(column[:, None])[0] / field.base.gram(column[:, None])[0, 0])
+    assert card.value.amplitude == pytest.approx(abs(size), rel=1e-3)
+    assert card.amplitude_se == pytest.approx(field.base.gram(column[:, None])[0, 0] ** -0.5, rel=0.2)
