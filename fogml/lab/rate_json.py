@@ -20,6 +20,7 @@ from fogml.lab.rate_tests import (
     Line,
     Range,
     dead_zone,
+    drift_shown,
     least_seen,
     near_zero,
     scale_line,
@@ -27,8 +28,10 @@ from fogml.lab.rate_tests import (
     zero_answers,
 )
 from fogml.runs.run import Run
+from fogml.runs.thermal_columns import leading_temperature
 from fogml.twin.coil import LayeredCoil, lead_sensitivity, midpoint_sensitivity, radial_sensitivity
 from fogml.twin.twin import Twin
+from fogml.validation.scale_factor import LEAST_LEVELS
 
 SCHEMA = "fogml.rate/1"
 
@@ -79,7 +82,7 @@ def rate_json(
     read = _read(runs, settle_s)
     greatest = max((float(np.abs(p.rate).max()) for _, p in read.ladders if len(p)), default=0.0)
     main = _main_ladder(read, greatest, criteria)
-    line, held = (None, None) if main is None else main
+    line, held, doubts = (None, None, ()) if main is None else main
     scale = 1.0 if line is None else line.scale_factor
     small = _small(read, greatest, scale, criteria)
     zero, steps = (_by_size(answers) for answers in small)
@@ -121,7 +124,7 @@ def rate_json(
         "unit": None if twin is None else unit_facts(twin),
     }
     told = () if twin is None else twin.notes
-    return values | {"notes": [*told, *_notes(values)]}
+    return values | {"notes": [*told, *doubts, *_notes(values)]}
 
 
 def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
@@ -150,9 +153,11 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
     return _Read(ladders, gains, slews)
 
 
-def _main_ladder(read: _Read, greatest: float, criteria: Criteria) -> tuple[Line, Range] | None:
+def _main_ladder(
+    read: _Read, greatest: float, criteria: Criteria
+) -> tuple[Line, Range, tuple[str, ...]] | None:
     """Of the run, and the temperature, with the most different large rates against the greatest of all
-    [deg/h]; a scale factor that goes with temperature is no nonlinearity."""
+    [deg/h]; a scale factor that goes with temperature is no nonlinearity. With what to mind."""
     best: tuple[Line, Range, Run, Plateaus] | None = None
     most = 0
     for run, whole in read.ladders:
@@ -167,7 +172,30 @@ def _main_ladder(read: _Read, greatest: float, criteria: Criteria) -> tuple[Line
     line, held, run, plateaus = best
     followed = plateaus[np.abs(plateaus.rate) <= held.followed]
     within = nonlinearity_within(run, followed, line.scale_factor)
-    return replace(line, nonlinearity_ci90_ppm=within), held
+    return replace(line, nonlinearity_ci90_ppm=within), held, _of_drift(run, followed)
+
+
+def _of_drift(run: Run, plateaus: Plateaus, most: float = 0.1, steady_degC: float = 0.5) -> tuple[str, ...]:
+    """What a drift of the scale factor would do, where more than a share `most` of it moves the line's.
+
+    Nothing where the recorded temperature stays within `steady_degC`: of the usual 10 ppm/degC 5 ppm.
+    """
+    if len(plateaus) < LEAST_LEVELS:
+        return ()
+    moved, bent = drift_shown(plateaus)
+    warmth = leading_temperature(run)
+    over = "the temperature is not recorded"
+    if warmth is not None:
+        span = float(np.ptp(warmth[int(plateaus.start[0]) : int(plateaus.stop[-1])]))
+        over = f"the temperature moves by {span:.2g} degC"
+        moved *= span > steady_degC
+    if moved <= most:
+        return ()
+    return (
+        f"The rates grow or fall over the test, and {over}: a scale factor that drifts by 1 ppm meanwhile is "
+        f"told {moved:.2g} ppm off its middle, with a nonlinearity of {bent:.2g} ppm that is none; no "
+        "interval holds that. Let the rates come again the other way round.",
+    )
 
 
 def _small(

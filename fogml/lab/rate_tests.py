@@ -8,7 +8,7 @@ again: of rates that come once, it can't be told from a scale factor that goes w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -205,6 +205,21 @@ def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
         asymmetry,
         asymmetry_ends,
     )
+
+
+def drift_shown(plateaus: Plateaus) -> tuple[float, float]:
+    """What a scale factor that drifts steadily over a ladder does, as shares of the drift.
+
+    How far off its middle value the line's scale factor is, and what nonlinearity shows; both are 0 of rates
+    that come again the other way round.
+    """
+    course = plateaus.time - 0.5 * (plateaus.time.min() + plateaus.time.max())
+    grown = replace(plateaus, output=plateaus.rate * course / np.ptp(course))
+    scale, bias, drift = _fit(grown)
+    level = _levels(plateaus)
+    left = grown.output - drift * plateaus.time - bias - scale * plateaus.rate
+    means = np.bincount(level, left) / np.bincount(level)
+    return abs(scale), float(np.abs(means).max() / np.abs(plateaus.rate).max())
 
 
 def near_zero(plateaus: Plateaus, greatest: float, criteria: Criteria) -> Plateaus:

@@ -61,3 +61,27 @@ def test_words_say_where_noise_alone_may_make_it() -> None:
 def test_three_rates_tell_none() -> None:
     line = told(0.0, 0, (0.0, 10.0, -10.0, 0.0))["scale_factor"]
     assert line["nonlinearity_ppm"] is None and line["nonlinearity_ci90_ppm"] is None
+
+
+def test_a_rising_ladder_says_what_a_drift_of_the_scale_factor_makes_of_it() -> None:
+    """By a gyro whose scale factor grows by 100 ppm; rates that come back the other way round bear it."""
+    found = {}
+    for name, rates in (("rising", RATES), ("back", (*RATES, *RATES[::-1]))):
+        rate = np.repeat(rates, 60)
+        course = np.arange(len(rate)) / (len(rate) - 1.0) - 0.5
+        gyro = 3600.0 * rate * (1.0 + 100e-6 * course)
+        run = Run("ladder", {"time": np.arange(len(rate)) + 1.0, "rate": rate, "gyro": gyro}, Facts())
+        values = rate_json([run], source="a ladder")
+        off = 1e6 * abs(values["scale_factor"]["scale_factor"] - 1.0) / 100.0
+        words = [note for note in values["notes"] if "rates grow or fall" in note]
+        found[name] = off, values["scale_factor"]["nonlinearity_ppm"] / 100.0, words
+    off, bent, (words,) = found["rising"]
+    # Plateaus' middles are as far apart as all but one of ten of them.
+    assert float(words.split("told ")[1].split()[0]) == pytest.approx(off / 0.9, rel=0.05)
+    assert float(words.split("nonlinearity of ")[1].split()[0]) == pytest.approx(bent / 0.9, rel=0.06)
+    assert off > 0.1 and found["back"][0] < 0.01 and not found["back"][2]
+    # A temperature that stays speaks against it.
+    for span, said in ((0.1, False), (3.0, True)):
+        warm = run.with_columns(T=25.0 + span * course)[: 60 * len(RATES)]
+        notes = rate_json([warm], source="a ladder")["notes"]
+        assert any("rates grow or fall" in note for note in notes) == said
