@@ -14,7 +14,7 @@ from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG
 from fogml.runs.raw_table import numbered_row
 from fogml.runs.run import Run
-from fogml.runs.transitions import transition_mask
+from fogml.runs.transitions import MARGIN_BEYOND_S, time_to_rate_s, transition_mask
 from fogml.runs.turning import LEAST_RATE_DEG_S, turning
 
 
@@ -143,7 +143,26 @@ def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
     first, last = edges[:-1][kept[edges[:-1]]], edges[1:][kept[edges[:-1]]]
     sample_s = run.sample_s
     ends = np.array([_whole_turns(run, a, b, sample_s) for a, b in zip(first, last)], dtype=np.intp)
-    return _measured(rows, _chunks(rows, (first, ends), rest))
+    try:
+        return _measured(rows, _chunks(rows, (first, ends), rest))
+    except InputError:
+        _check_left(rows, run, kept, rest)
+        raise
+
+
+def _check_left(rows: Rows, run: Run, kept: BoolArray, rest: BoolArray) -> None:
+    """Hold that of each rest something is left beside what is cut about changes of the rate."""
+    starts = np.concatenate([[0], np.flatnonzero(rest[1:] != rest[:-1]) + 1])
+    gone = rest[starts] & (np.add.reduceat(kept.astype(np.intp), starts) == 0)
+    if gone.any():
+        first = int(starts[np.argmax(gone)])
+        last = int(np.append(starts, len(kept))[np.argmax(gone) + 1]) - 1
+        raise InputError(
+            f"{rows.source}, {rows.row_name(first)}: nothing is left of the rest of "
+            f"{run.time[last] - run.time[first]:.4g} s, as {time_to_rate_s(run) + MARGIN_BEYOND_S:.3g} s and "
+            "more are cut about each change of the rate, by the longest time that table and gyro take to "
+            "settle; let rests last longer, or the table accelerate faster"
+        )
 
 
 def _whole_turns(run: Run, first: int, last: int, sample_s: float) -> int:

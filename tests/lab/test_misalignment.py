@@ -325,3 +325,14 @@ def test_turns_too_short_to_settle_are_told() -> None:
     rows, time = samples(UNIT, TILTS, (36.0,), turn_s=4.0)
     with pytest.raises(InputError, match="column 'time': every turn is over before table and gyro"):
         from_samples(rows, time)
+
+
+def test_rests_that_are_cut_away_whole_are_told_with_how_much_is_cut() -> None:
+    """A table that takes 10 s to its rate, and rests of 15 s between."""
+    rows, time = samples(
+        UNIT, TILTS, (100.0,), rest_s=15.0, turn_s=60.0, acceleration_deg_s2=10.0, noise=1e-4
+    )
+    with pytest.raises(InputError, match=r"rest of 14\.9 s, as 1\d\.?\d* s and more are cut"):
+        from_samples(rows, time)
+    longer, time = samples(UNIT, TILTS, (100.0,), rest_s=60.0, acceleration_deg_s2=10.0, turn_s=60.0)
+    np.testing.assert_allclose(decouple(from_samples(longer, time)).K, UNIT.K, rtol=1e-6)
