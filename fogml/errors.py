@@ -47,6 +47,13 @@ def first_line(error: BaseException) -> str:
     return (str(error).strip() or type(error).__name__).splitlines()[0]
 
 
+def in_one_line(message: str) -> str:
+    """A message without the text that it points into and the mark below that."""
+    lines = message.splitlines()
+    kept = [line for line, below in zip(lines, [*lines[1:], ""]) if "^" not in (line.strip(), below.strip())]
+    return "; ".join(line.strip() for line in kept)
+
+
 def quoted(value: object) -> str:
     """A value that was found, for a message: text in quotation marks, any other as Python writes it, cut."""
     if isinstance(value, str):

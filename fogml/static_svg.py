@@ -76,7 +76,7 @@ def line_figure(
         Axes that are logarithmic: ``""``, ``"x"``, ``"y"`` or ``"xy"``.
     """
     scale_x, scale_y = (np.log10 if axis in log else np.asarray for axis in "xy")
-    x_span = _span([scale_x(c.x) for c in curves], 0.0)
+    x_span = _span([scale_x(c.x) for c in curves], 0.02 if any(c.dots for c in curves) else 0.0)
     y_span = _span([scale_y(c.y) for c in curves], 0.06)
     if "y" in log:
         # Less than a decade might have no tick, and a flat curve would not look flat.

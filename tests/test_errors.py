@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from fogml.errors import LONGEST_MESSAGE, LONGEST_QUOTED, InputError, did_you_mean, listed, quoted
+from fogml.errors import (
+    LONGEST_MESSAGE,
+    LONGEST_QUOTED,
+    InputError,
+    did_you_mean,
+    in_one_line,
+    listed,
+    quoted,
+)
 from fogml.export.noise_parameters import noise_text
 from fogml.runs.columns import conversion
 from fogml.runs.facts import facts_from
@@ -80,3 +88,9 @@ def test_names_that_look_alike_are_offered(name: str, most: int, told: str) -> N
 def test_what_ships_is_offered_where_a_name_looks_like_it(ask, name: str, meant: str) -> None:
     with pytest.raises(InputError, match=f"{name}.* did you mean '{meant}'"):
         ask(name)
+
+
+def test_a_message_that_points_into_a_text_has_one_line_without_it() -> None:
+    told = "a.csv: no temperature 'T_in'\n  T, T_in-T_out, T^2\n     ^\nthe run holds T"
+    assert in_one_line(told) == "a.csv: no temperature 'T_in'; the run holds T"
+    assert in_one_line("a.csv: T^2 is cold") == "a.csv: T^2 is cold"

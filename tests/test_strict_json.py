@@ -68,6 +68,9 @@ def test_files(tmp_path):
     path = tmp_path / "a.json"
     with pytest.raises(InputError, match=r"a\.json: no such file; make it"):
         read_json(path, "make it")
+    (tmp_path / "b.csv").write_text("")
+    with pytest.raises(InputError, match=r"b\.csv/model\.json: no such file; name the folder"):
+        read_json(tmp_path / "b.csv" / "model.json", "name the folder")
     path.write_text("[" + " " * (2 << 20) + "]")
     with pytest.raises(InputError, match="larger than 1 MB"):
         read_json(path, "make it", 1 << 20)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError, known_are, quoted
+from fogml.runs.csv_dialect import text_of
 from fogml.yaml_text import read_yaml
 
 MANIFEST_SCHEMA = "fogml.manifest/1"
@@ -66,7 +68,8 @@ class Unit:
 def read_manifest(path: str | Path) -> list[Unit]:
     """The units of a manifest, in its order.
 
-    A CSV file has the columns ``unit, job, train, test, axis``, lists of runs separated by ``;``. Columns
+    A CSV file has the columns ``unit, job, train, test, axis``, lists of runs separated by ``;``, within
+    quotation marks where that separates cells too. Columns
     such as ``covariate:coil_lot`` state what is known of a unit's production; empty cells are not known.
     A YAML file is a list of mappings with these keys, or has them under ``units``. Runs are looked
     for from here, then from where the manifest lies.
@@ -78,7 +81,8 @@ def read_manifest(path: str | Path) -> list[Unit]:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"{path}: no such file; a manifest was expected, CSV or YAML")
+        what = "is a folder" if path.is_dir() else "no such file"
+        raise InputError(f"{path}: {what}; a manifest was expected, CSV or YAML")
     rows = _yaml_rows(path) if path.suffix.lower() in (".yaml", ".yml") else _csv_rows(path)
     units = [_unit(row, place, path) for place, row in rows]
     if not units:
@@ -87,17 +91,16 @@ def read_manifest(path: str | Path) -> list[Unit]:
 
 
 def _csv_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
+    """Rows as a spreadsheet program saves them, in any language: its encoding and what separates cells."""
+    lines = [line for line in io.StringIO(text_of(path), newline="") if not line.startswith("#")]
+    head = lines[0] if lines else ""
+    separator = next((mark for mark in ",;\t" if mark in head), ",")
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(
-                (line for line in file if not line.startswith("#")), skipinitialspace=True, strict=True
-            )
-            heads = [str(name).strip() for name in reader.fieldnames or ()]
-            _check_keys(heads, f"{path.name}: header")
-            reader.fieldnames = heads
-            return [(f"row {number}", row) for number, row in enumerate(reader, start=2) if any(row.values())]
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path.name}: is no UTF-8 text ({error.reason} at byte {error.start})") from None
+        reader = csv.DictReader(lines, delimiter=separator, skipinitialspace=True, strict=True)
+        heads = [str(name).strip() for name in reader.fieldnames or ()]
+        _check_keys(heads, f"{path.name}: header")
+        reader.fieldnames = heads
+        return [(f"row {number}", row) for number, row in enumerate(reader, start=2) if any(row.values())]
     except csv.Error as error:
         raise InputError(
             f"{path.name}: not readable as CSV ({error}); is a quotation mark not closed?"

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from fogml import __version__
-from fogml.errors import FogmlError, InputError
+from fogml.errors import FogmlError, InputError, in_one_line
 from fogml.fleet.manifest import Unit
 from fogml.json_files import read_json, write_json
 from fogml.outputs import NO_ROOM, whole_file
@@ -147,7 +147,7 @@ def run_task(task: Task) -> dict[str, Any]:
             raise full_disk(task.home, error) from error
         outcome |= {"status": FAILED, "reason": f"{error.filename or ''}: {error.strerror}".lstrip(": ")}
     except FogmlError as error:
-        outcome |= {"status": FAILED, "reason": str(error)}
+        outcome |= {"status": FAILED, "reason": in_one_line(str(error))}
     except Exception as error:
         # Whatever one unit runs into, the others go on.
         outcome |= {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}

@@ -33,6 +33,7 @@ _POINTS = 700
 _NOT_STATED, _NOT_TOLD = "not stated", "not told"
 _TERMS = {"N": "Angle random walk", "B": "Bias instability", "K": "Rate random walk"}
 _MOST_RUNS = 8
+_MOST_FEATURES = 3
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ def _sheet(judgement: Judgement) -> Sheet:
     worst = worst_run(judgement.test)
     shown = sorted(judgement.test, key=lambda run: -run.after.rms)[:_MOST_RUNS]
     figure, words = _figure(worst)
-    card = dict(model_card(judgement.model))
+    card = dict(model_card(judgement.model, _MOST_FEATURES))
     about = [
         ("Model", f"{card['kind']}" + (f" of {card['features']}" if "features" in card else "")),
         ("Size", ", ".join(card_line(card))),

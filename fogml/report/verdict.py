@@ -186,11 +186,14 @@ def _outside(runs: Sequence[RunJudgement]) -> list[str]:
     return [f"Outside the temperatures and rates of training: {shares}; there the model falls back."]
 
 
-def model_card(model: dict[str, Any]) -> list[tuple[str, str]]:
-    """Name and value of what a model tells of itself, for a definition list."""
+def model_card(model: dict[str, Any], most: int | None = None) -> list[tuple[str, str]]:
+    """Name and value of what a model tells of itself, for a definition list.
+
+    Of features and of what it was trained within, `most` are listed.
+    """
     rows = [("kind", str(model.get("kind", "")))]
     if model.get("features"):
-        rows.append(("features", ", ".join(str(name) for name in model["features"])))
+        rows.append(("features", _first(model["features"], ", ", most)))
     parameters = model.get("parameters")
     if parameters is not None:
         rows.append(("parameters", f"{parameters:,}".replace(",", "\u202f")))
@@ -207,13 +210,18 @@ def model_card(model: dict[str, Any]) -> list[tuple[str, str]]:
             f"{name} {number(low)} to {number(high)}{_atom_unit(name)}"
             for name, (low, high) in model["box"].items()
         ]
-        rows.append(("trained within", "; ".join(spans)))
+        rows.append(("trained within", _first(spans, "; ", most)))
     interval = model.get("interval") or {}
     if interval.get("half_width_90") is not None:
         rows.append(("90 % band", interval_words(interval)))
     if model.get("chosen_by"):
         rows.append(("chosen by", f"{model['chosen_by']}, among those below"))
     return rows
+
+
+def _first(names: Sequence[object], between: str, most: int | None) -> str:
+    left = 0 if most is None else max(len(names) - most, 0)
+    return between.join(map(str, names[:most])) + (f" and {left} more" if left > 0 else "")
 
 
 def _atom_unit(name: str) -> str:

@@ -174,6 +174,22 @@ def decoded_head(path: Path) -> tuple[str, str]:
     return text if len(head) < _HEAD_BYTES else text[: text.rfind("\n") + 1], source.wide or encoding
 
 
+def text_of(path: Path) -> str:
+    """The whole text of a small file, in whatever encoding a spreadsheet program saves it.
+
+    Raises
+    ------
+    InputError
+        If it is no text.
+    """
+    decoded_head(path)
+    with path.open("rb") as file:
+        source = csv_source(path, file.read(_HEAD_BYTES))
+    with source.open() as opened:
+        content = opened.read()
+    return content.decode(_encoding(content, cut=False), errors="replace")
+
+
 def is_sure(content: bytes) -> bool:
     """Whether a text has a header that names a time and a gyro."""
     head = content[:_HEAD_BYTES].decode("utf-8", errors="ignore")
@@ -237,7 +253,7 @@ def _encoding(head: bytes, cut: bool) -> str:
         return "utf-8-sig"
     # Both bytes of a Chinese sign are above 0xA0; the degree sign of Latin-1 stands before a plain letter.
     try:
-        head[: head.rfind(b"\n") + 1 or len(head)].decode("gb2312")
+        head[: (head.rfind(b"\n") + 1 if cut else 0) or len(head)].decode("gb2312")
     except UnicodeDecodeError:
         return "latin-1"
     return "gb18030"

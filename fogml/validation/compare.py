@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fogml.errors import FogmlError, InputError
+from fogml.errors import FogmlError, InputError, in_one_line
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S
 from fogml.validation.judge import judgement_of
@@ -121,7 +121,7 @@ def compare(
                     whole[name], [fold[name] for fold in folds], design_index, limits
                 )
             except InputError as error:
-                contest.failed[name] = str(error)
+                contest.failed[name] = in_one_line(str(error))
     if not judgements:
         name, reason = next(iter(contest.failed.items()), ("", "no model was named"))
         raise InputError(f"no model could be fitted and judged; {name}: {reason}")
@@ -188,4 +188,4 @@ class _Contest:
     def _drop(self, name: str, error: BaseException) -> None:
         del self.makers[name]
         known = isinstance(error, FogmlError)
-        self.failed[name] = str(error) if known else f"{type(error).__name__}: {error}"
+        self.failed[name] = in_one_line(str(error)) if known else f"{type(error).__name__}: {error}"

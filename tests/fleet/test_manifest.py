@@ -41,6 +41,24 @@ def test_csv_and_yaml_say_the_same(folder):
     assert first.folder != second.folder
 
 
+@pytest.mark.parametrize(
+    ("separator", "encoding"), [(";", "utf-8-sig"), (";", "latin-1"), ("\t", "utf-16"), (",", "gb18030")]
+)
+def test_as_a_spreadsheet_program_of_another_language_saves_it(folder, separator, encoding):
+    name = "单元 1" if encoding == "gb18030" else "Kreisel Süd"
+    rows = [["unit", "job", "train", "test", "axis"], [name, "train", '"a.csv;b.csv"', "c.csv", "x"]]
+    path = folder / "m.csv"
+    path.write_bytes("\r\n".join(separator.join(row) for row in rows).encode(encoding))
+    (unit,) = read_manifest(path)
+    assert unit.name == name and unit.axis == "x"
+    assert unit.train == (str(folder / "a.csv"), str(folder / "b.csv"))
+
+
+def test_a_folder_is_no_manifest(folder):
+    with pytest.raises(InputError, match="is a folder; a manifest was expected"):
+        read_manifest(folder)
+
+
 def test_folders_are_safe_and_unlike_each_other(folder):
     given = ("a/b", "a:b", "..", "A_B", "../../etc", "x" * 300, "x" * 301)
     lines = "".join(f'"{name}",train,a.csv,b.csv,\n' for name in given)

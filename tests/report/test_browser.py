@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
 
 from fogml.report import page
+from fogml.report.certificate import certificate
 from fogml.report.words import number
 from tests.report.chromium import CHROMIUM, Browser, Opened
+from tests.report.judgements import judgement
 from tests.report.many_units import batch_biases, pages_of_many
 from tests.report.pages import Page, every_page
 from tests.report.procedure_pages import procedure_pages
@@ -94,6 +97,18 @@ FIGURES = """Array.from(document.querySelectorAll(".plot")).map(function (plot) 
 })"""  # noqa: E501
 
 
+def test_no_legend_reaches_under_the_tools(browser) -> None:
+    opened = browser(pages()["noise"])
+    boxes = """["legend", "modebar"].map(function (name) {
+      var box = document.querySelector(".plot ." + name).getBoundingClientRect();
+      return [box.left, box.right, box.top, box.bottom];
+    })"""
+    (_, right, top, _), (left, _, _, bottom) = opened.tell(boxes)
+    opened.close()
+    assert right > left, "the legend is too short to tell"
+    assert top >= bottom
+
+
 def test_a_slider_moves_what_is_replayed(browser) -> None:
     opened = browser(every_page()["what if"])
     left = 'document.getElementById("left").textContent'
@@ -158,8 +173,17 @@ def test_an_error_in_a_script_would_be_noticed(browser) -> None:
     opened.close()
 
 
-def test_a_certificate_prints_on_one_a4_sheet(browser) -> None:
-    opened = browser(pages()["certificate"])
+def of_many_features() -> str:
+    """The certificate of a model of 18 features, each with a trained range of its own."""
+    judged = judgement()
+    names = [f"lag(T_in-T_out, {seconds} s)" for seconds in range(100, 1900, 100)]
+    model = {**judged.model, "features": names, "box": dict.fromkeys(names, (-36.57, 63.51))}
+    return certificate(replace(judged, model=model), "2026-03-02")
+
+
+@pytest.mark.parametrize("make", [lambda: pages()["certificate"], of_many_features])
+def test_a_certificate_prints_on_one_a4_sheet(browser, make) -> None:
+    opened = browser(make())
     assert "<svg" in opened.tell("document.documentElement.outerHTML")
     pdf = opened.printed()
     assert len(re.findall(rb"/Type\s*/Page[^s]", pdf)) == 1
