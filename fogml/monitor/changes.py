@@ -34,6 +34,9 @@ from fogml.errors import InputError
 from fogml.intervals import LEVEL, TAILS
 from fogml.monitor.evidence import SHAPES, ChangePrior, FigureEvidence, Shape
 
+_FEW_RUNS = 64
+"""Runs that are judged at first, and after each alarm; then twice as many, and so on."""
+
 
 @dataclass(frozen=True)
 class Change:
@@ -95,7 +98,7 @@ def change_chart(
 ) -> Chart:
     """The evidence that figures of consecutive runs changed.
 
-    Takes O(n**2) time for n runs.
+    Takes O(n**3) time and O(n**2) memory for n runs: two minutes and 0.7 GB for four figures of 1500.
 
     Parameters
     ----------
@@ -136,12 +139,16 @@ def change_chart(
     statistic = np.zeros(len(age))
     changes: list[Change] = []
     first = place = 0
+    stop = _FEW_RUNS
     while place < len(age):
+        # Not all runs at once, as those after an alarm are judged anew.
         charts = {
-            name: FigureEvidence(values, age, first, prior, (errors or {}).get(name))
+            name: FigureEvidence(
+                values[:stop], age[:stop], first, prior, _until((errors or {}).get(name), stop)
+            )
             for name, values in figures.items()
         }
-        while place < len(age):
+        while place < min(stop, len(age)):
             for one in charts.values():
                 one.go_to(place)
             logs = {name: one.logs - np.log(len(figures)) for name, one in charts.items() if len(one.logs)}
@@ -151,8 +158,15 @@ def change_chart(
             if statistic[place - 1] >= runs_between_false_alarms:
                 changes.append(_change(charts, logs, place - 1, statistic[place - 1]))
                 first = max(changes[-1].onset, first + 1)
+                stop = place + _FEW_RUNS
                 break
+        else:
+            stop = 2 * stop
     return Chart(statistic, tuple(changes))
+
+
+def _until(values: FloatArray | None, stop: int) -> FloatArray | None:
+    return None if values is None else values[:stop]
 
 
 def _change(

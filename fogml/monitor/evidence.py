@@ -16,6 +16,10 @@ Shape = Literal["step", "ramp"]
 SHAPES: tuple[Shape, ...] = ("step", "ramp")
 
 
+_ROWS = 256
+"""Runs that are judged at once: few, so that the tables of all onsets stay small."""
+
+
 @dataclass(frozen=True)
 class ChangePrior:
     """What is taken for granted of changes.
@@ -58,8 +62,11 @@ def flicker_covariance(t: FloatArray, longest: float) -> FloatArray:
     of t to `longest`; what is slower is constant.
     """
     ladder = flicker_ladder(1.0, longest)
-    apart = np.abs(t[:, None] - t)[..., None]
-    return np.asarray(ladder.step * np.sum(np.exp(-apart / ladder.time_constants_s), axis=-1))
+    apart = np.abs(t[:, None] - t)
+    total = np.zeros_like(apart)
+    for time_constant in ladder.time_constants_s:
+        total += np.exp(-apart / time_constant)
+    return np.asarray(ladder.step * total)
 
 
 class FigureEvidence:
@@ -113,16 +120,73 @@ class FigureEvidence:
             # No run is told so well that all others count for nothing beside it.
             own = np.maximum(own / np.exp(np.mean(np.log(own[:start]))), 1e-9)
         w, q = (part.ravel() for part in np.meshgrid(between, prior.wander))
-        white = w + (1.0 - w) * own[:, None]
-        flicker = flicker_covariance(self._t, prior.longest_wander)
-        covariances = flicker * q[:, None, None] + np.einsum("ng,nm->gnm", white, np.eye(n))
-        roots = np.linalg.cholesky(covariances)
-        columns = [self._shape(np.arange(start, n, dtype=np.intp), s) for s in range(len(SHAPES))]
-        # Whitened by Cholesky's root, what the first runs tell does not depend on those that follow.
-        table = np.column_stack((self._y, np.ones(n), np.stack(columns, axis=-1).reshape(n, -1)))
-        self._innovations = solve_triangular(roots, table[None], lower=True)
-        self._log_dets = np.cumsum(np.log(np.diagonal(roots, axis1=1, axis2=2)), axis=1)
-        self._of_mean, self._of_values, self._squares = np.zeros((3, len(q), table.shape[1]))
+        self._white = w[:, None] + (1.0 - w[:, None]) * own
+        self._wander, self._flicker = q, flicker_covariance(self._t, prior.longest_wander)
+        self._judge()
+
+    def _whitened(self, model: int, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Columns by a covariance's root, shape (n, k), and its determinant's logarithm, run by run, (n,).
+
+        Whitened by Cholesky's root, what the first runs tell does not depend on those that follow.
+        """
+        covariance = self._wander[model] * self._flicker + np.diag(self._white[model])
+        root = np.linalg.cholesky(covariance)
+        return solve_triangular(root, columns, lower=True), np.cumsum(np.log(np.diag(root)))
+
+    def _columns(self) -> FloatArray:
+        """What changes add to each run, shape (n, 2 m): onset by onset a step and a ramp."""
+        onsets = np.arange(self._baseline, len(self._y), dtype=np.intp)
+        shapes = [self._shape(onsets, s) for s in range(len(SHAPES))]
+        return np.stack(shapes, axis=-1).reshape(len(self._y), -1)
+
+    def _judge(self) -> None:
+        """Log evidence by the first 1 to n told runs; covariance by covariance, as all take much room."""
+        n, start = len(self._y), self._baseline
+        count, pair = np.arange(1.0, n + 1.0), np.column_stack((self._y, np.ones(n)))
+        plain, least = np.empty((len(self._wander), n)), np.full(n, np.inf)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for model in range(len(plain)):
+                z, log_dets = self._whitened(model, pair)
+                ones, about = _about(z)
+                least = np.minimum(least, about)
+                plain[model] = -log_dets - 0.5 * np.log(ones) - 0.5 * (count - 1.0) * np.log(about)
+        silent = ~(least > count * np.maximum.accumulate(self._least))
+        plain[:, silent] = 0.0
+        weights = plain - np.logaddexp.reduce(plain)
+        columns = self._columns()
+        sizes = np.tile(self._sizes, (n - start, 1))
+        valid = np.repeat(np.arange(start, n), len(SHAPES))
+        self._all = np.full(columns.shape, -np.inf)
+        best, self._best = np.full(n, -np.inf), np.zeros(n, dtype=np.intp)
+        for model in range(len(plain)):
+            z, _ = self._whitened(model, np.column_stack((pair, columns)))
+            ones, about = _about(z[:, :2])
+            about[silent], sums = 1.0, np.zeros((3, columns.shape[1]))
+            share = np.cumsum(z[:, 0] * z[:, 1]) / ones
+            for first in range(start, n, _ROWS):
+                rows = slice(first, min(first + _ROWS, n))
+                # Changes that begin later add nothing yet.
+                known = slice(0, len(SHAPES) * (rows.stop - start))
+                part = z[rows, 2:][:, known]
+                products = (part * z[rows, :1], part * z[rows, 1:2], part**2)
+                of_values, of_mean, squares = sums[:, None, known] + np.cumsum(products, axis=1)
+                sums[:, known] = of_values[-1], of_mean[-1], squares[-1]
+                v = np.maximum(squares - of_mean**2 / ones[rows, None], 0.0)
+                b = np.square(of_values - of_mean * share[rows, None]) / about[rows, None]
+                freedom = 0.5 * (count[rows, None] - 1.0)
+                later = count[rows, None] <= valid[known]
+                for size in sizes.T:
+                    wide = 1.0 + size[known] * v
+                    # Rounding aside, what a column explains is less than all.
+                    gained = np.minimum(size[known] * b / wide, 1.0 - 1e-15)
+                    ratios = weights[model, rows, None] - 0.5 * np.log(wide) - freedom * np.log1p(-gained)
+                    ratios[later] = -np.inf
+                    self._all[rows, known] = np.logaddexp(self._all[rows, known], ratios)
+                    greatest = ratios.max(axis=1)
+                    self._best[rows][greatest > best[rows]] = model
+                    best[rows] = np.maximum(best[rows], greatest)
+        self._all -= np.log(self._sizes.size)
+        self._all[silent] = -np.inf
 
     def _shape(self, onsets: IndexArray, shape: int) -> FloatArray:
         """What a change adds to each run, per size, for each onset; shape (n, m)."""
@@ -132,38 +196,10 @@ class FigureEvidence:
 
     def go_to(self, place: int) -> None:
         """Take the runs up to and with index `place`."""
-        if len(self._rows) <= self._baseline:
-            return
-        while self._done < len(self._rows) and self._rows[self._done] <= place:
-            row = self._innovations[:, self._done]
-            self._of_values += row * row[:, :1]
-            self._of_mean += row * row[:, 1:2]
-            self._squares += row**2
-            self._done += 1
-            if self._done > self._baseline:
-                self.logs = self._evidence(self._done)
-
-    def _evidence(self, n: int) -> FloatArray:
-        """Log evidence of each onset and shape by the first n told runs, shape (m, 2)."""
-        count = n - self._baseline
-        ones = self._of_mean[:, 1]
-        about = self._of_values[:, 0] - self._of_values[:, 1] ** 2 / ones
-        if np.min(about) <= n * np.max(self._least[:n]):
-            return np.full((count, len(SHAPES)), -np.inf)
-        plain = -self._log_dets[:, n - 1] - 0.5 * np.log(ones) - 0.5 * (n - 1) * np.log(about)
-        part = slice(2, 2 + count * len(SHAPES))
-        by_mean = self._of_mean[:, part]
-        v = self._squares[:, part] - by_mean**2 / ones[:, None]
-        b = self._of_values[:, part] - by_mean * (self._of_values[:, 1] / ones)[:, None]
-        v, b = (one.reshape(len(ones), count, len(SHAPES), 1) for one in (v, b))
-        wide = 1.0 + self._sizes * np.maximum(v, 0.0)
-        gained = self._sizes * b**2 / wide / about[:, None, None, None]
-        # Rounding aside, what a column explains is less than all.
-        ratios = -0.5 * np.log(wide) - 0.5 * (n - 1) * np.log1p(-np.minimum(gained, 1.0 - 1e-15))
-        ratios += (plain - np.logaddexp.reduce(plain))[:, None, None, None]
-        self._best = int(np.argmax(np.max(ratios, axis=(1, 2, 3))))
-        summed = np.logaddexp.reduce(np.logaddexp.reduce(ratios, axis=3), axis=0)
-        return np.asarray(summed - np.log(self._sizes.size))
+        self._done = int(np.searchsorted(self._rows, place, side="right"))
+        if self._done > self._baseline:
+            told = self._all[self._done - 1, : len(SHAPES) * (self._done - self._baseline)]
+            self.logs = told.reshape(-1, len(SHAPES))
 
     def onset(self, change: int) -> int:
         """Index of the run that a change begins with."""
@@ -172,7 +208,8 @@ class FigureEvidence:
     def size_quantile(self, level: float, shape: int, shares: FloatArray) -> float:
         """Quantile of a change's size, whose onset has the probabilities `shares`, shape (m,)."""
         n, onsets = self._done, np.flatnonzero(shares)
-        whitened = self._innovations[self._best, :n]
+        table = np.column_stack((self._y, np.ones(len(self._y)), self._columns()))
+        whitened = self._whitened(int(self._best[n - 1]), table)[0][:n]
         # A line through whitened runs: of each column and of the values what is left beside the mean.
         mean = whitened[:, 1] / np.linalg.norm(whitened[:, 1])
         left = whitened - np.outer(mean, mean @ whitened)
@@ -188,3 +225,9 @@ class FigureEvidence:
         scales = np.linalg.norm(y[:, None] - columns * sizes, axis=0) / np.sqrt(n - 2) / lengths
         scales = np.maximum(scales, np.spacing(np.abs(sizes)))
         return students_ppf(level, weights / weights.sum(), sizes, scales, n - 2)
+
+
+def _about(z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of whitened values and ones, run by run: the ones' squares, and the values' about their mean, (n,)."""
+    ones = np.cumsum(z[:, 1] ** 2)
+    return ones, np.cumsum(z[:, 0] ** 2) - np.cumsum(z[:, 0] * z[:, 1]) ** 2 / ones

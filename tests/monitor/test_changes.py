@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from types import SimpleNamespace
 
 import numpy as np
@@ -56,6 +57,20 @@ def test_the_statistic_is_the_sum_of_ratios_of_marginal_likelihoods(ages):
             plain = likelihood(step, 0.0)
             logs += [np.log(likelihood(step, 3.0) / plain), np.log(likelihood(ramp, 0.5) / plain)]
         assert chart.statistic[n - 1] == pytest.approx(np.sum(np.exp(logs)) / 2.0, rel=1e-6)
+
+
+def test_runs_that_follow_change_nothing_of_those_before_and_take_little_room():
+    """Beyond the runs that are judged at once; before, 300 runs of a figure took 90 MB."""
+    rng = np.random.default_rng(8)
+    level, age = rng.normal(size=300), np.cumsum(rng.uniform(0.5, 2.0, 300))
+    errors = np.exp(0.3 * rng.normal(size=300))
+    tracemalloc.start()
+    whole = change_chart({"level": level}, age, 1e9, errors={"level": errors})
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    part = change_chart({"level": level[:100]}, age[:100], 1e9, errors={"level": errors[:100]})
+    np.testing.assert_allclose(whole.statistic[:100], part.statistic, rtol=1e-8)
+    assert peak < 25e6
 
 
 def test_without_a_change_alarms_are_as_rare_as_stated():
