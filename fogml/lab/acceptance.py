@@ -81,8 +81,7 @@ def acceptance_json(
     seen = _seen(runs, model)
     still = [f"{one.run}: the output stands still: {one.still[0]}" for one in judged if one.still]
     verdict, reasons = _verdict(rows, limits, seen, still)
-    earth = all(run.earth_known for run in runs)
-    notes = [] if earth else ["Earth rate is not known (latitude, input_axis): the bias holds it."]
+    notes = _of_earth(runs)
     notes += [f"{name}: the model was trained on this run" for name in seen]
     notes += _left_out(errors) + _near(rows, limits)
     small = {run.name for run in runs if small_rates(run)}
@@ -110,6 +109,18 @@ def acceptance_json(
         "notes": notes,
     }
     return finite_json(values)
+
+
+def _of_earth(runs: Sequence[Run]) -> list[str]:
+    unknown = sorted({run.name for run in runs if not run.earth_known})
+    if not unknown:
+        return []
+    if not any(run.earth_known for run in runs):
+        return ["Earth rate is not known (latitude, input_axis): the bias holds it."]
+    return [
+        f"{listed(unknown, 3)}: Earth rate is not known (latitude, input_axis), so that bias, its "
+        "repeatability and what soaks of several runs tell are of the others"
+    ]
 
 
 def _check_one_gyro(runs: Sequence[Run]) -> None:

@@ -17,7 +17,7 @@ from fogml.runs.run import Run
 from fogml.runs.turning import least_rate_deg_s, white_noise
 from fogml.validation.certified import of_10_s, over_temperature
 from fogml.validation.metrics import repeatability_of
-from fogml.validation.results import RunJudgement, SoakBias, SpreadOverRuns
+from fogml.validation.results import Repeatability, RunJudgement, SoakBias, SpreadOverRuns
 from fogml.validation.soaks import (
     EQUAL_TEMPERATURE_DEGC,
     Soak,
@@ -38,6 +38,7 @@ def soak_table(judged: Sequence[RunJudgement]) -> list[dict[str, Any]]:
     if any({soak.approach for soak in soaks} >= {"up", "down"} for _, soaks in groups):
         groups = [(run, soaks) for run, soaks in groups if len(_by_temperature(soaks)) > 1]
     else:
+        groups = [(one.run, list(one.soaks)) for one in known_earth(judged) if one.soaks]
         together = [soak for _, soaks in groups for soak in soaks]
         groups = [("all runs together" if len(groups) > 1 else groups[0][0], together)] if groups else []
     return [_line(run, group) for run, soaks in groups for group in _by_temperature(soaks)]
@@ -137,8 +138,9 @@ def figures_of(
         Of a figure of single runs that is told which violates its limit most.
     """
     steady = [one for run, one in zip(before, judged, strict=True) if not small_rates(run)] or judged
+    biased = {**dict.fromkeys(_OF_BIAS, steady), "bias": known_earth(steady)}
     for key in _OF_RUNS:
-        told = [one for one in (steady if key in _OF_BIAS else judged) if getattr(one.after, key) is not None]
+        told = [one for one in biased.get(key, judged) if getattr(one.after, key) is not None]
         if told:
             limit = limits.by_quantity.get(key)
             factors = [_of_few(key, one) for one in told]
@@ -148,15 +150,15 @@ def figures_of(
             worst = told[place]
             was = factors[place] * getattr(worst.before, key)
             yield key, Figure(was, values[place], worst.run, ci90=_within(key, worst))
-    for key, pair in soaks_tell(steady).items():
+    for key, pair in soaks_tell(known_earth(steady)).items():
         if all(getattr(one.after, key) is None for one in judged):
             yield key, Figure(*pair, "all runs together")
-    spread = repeatability_of(judged)
+    spread = repeatability_of(known_earth(judged))
     if spread is not None:
-        over = f"{spread.runs} {'power cycles' if spread.power_cycles else 'runs'}"
-        yield "bias_repeatability", _repeated(spread.bias, over)
-        if spread.scale_factor is not None:
-            yield "scale_factor_repeatability", _repeated(spread.scale_factor, over)
+        yield "bias_repeatability", _repeated(spread.bias, _over(spread))
+    spread = repeatability_of(judged)
+    if spread is not None and spread.scale_factor is not None:
+        yield "scale_factor_repeatability", _repeated(spread.scale_factor, _over(spread))
     yield from _of_rates(before, after)
     yield from _of_noise(before, after, noise)
 
@@ -176,6 +178,15 @@ def _within(key: str, run: RunJudgement) -> tuple[float, float] | None:
     told = {"bias_stability": over_temperature, "bias_stability_10s": of_10_s}
     found = told[key](run) if key in told else None
     return None if found is None else found.ci90
+
+
+def known_earth(judged: Sequence[RunJudgement]) -> Sequence[RunJudgement]:
+    """Runs whose Earth rate is known; all where it is of none, as then it is in every bias alike."""
+    return [one for one in judged if one.bias_reference == "earth rate"] or judged
+
+
+def _over(found: Repeatability) -> str:
+    return f"{found.runs} {'power cycles' if found.power_cycles else 'runs'}"
 
 
 def _repeated(found: SpreadOverRuns, over: str) -> Figure:

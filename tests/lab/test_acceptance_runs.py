@@ -133,3 +133,29 @@ def test_bias_stability_is_over_one_less_than_the_averages(limits):
         true = gyro.reshape(-1, length).mean(axis=1).std(ddof=1)
         assert row(acceptance_json([run]), key)["before"] == pytest.approx(true, rel=1e-9)
         assert acceptance_json([run], limits=limits(**{key: 0.97 * float(true)}))["verdict"] == "rejected"
+
+
+def test_runs_that_do_not_state_their_attitude_bring_no_earth_rate_into_biases(limits):
+    """Of eight runs two state none: before, the report rejected the unit by 9.65 deg/h of Earth rate."""
+    rng = np.random.default_rng(9)
+    biases = 0.02 * rng.standard_normal(8)
+    temperatures = (25.0, 25.0, 25.0, -20.0, -20.0, 60.0, 60.0, 60.0)
+    runs = []
+    for k, (bias, temperature) in enumerate(zip(biases, temperatures, strict=True)):
+        gyro = EARTH + bias + 1e-4 * rng.standard_normal(1500)
+        facts = UP if k not in (1, 4) else Facts(unit=UP.unit, axis=UP.axis)
+        columns = {"time": np.arange(1500.0), "gyro": gyro, "T": np.full(1500, temperature)}
+        runs.append(Run.from_columns(f"run{k}", facts, **columns))
+    values = acceptance_json(
+        runs, limits=limits(bias=0.1, bias_repeatability=0.05, temperature_sensitivity=0.01)
+    )
+    known = np.delete(biases, [1, 4])
+    assert row(values, "bias")["before"] == pytest.approx(known[np.argmax(np.abs(known))], abs=1e-4)
+    assert row(values, "bias_repeatability")["before"] == pytest.approx(np.std(known, ddof=1), abs=1e-4)
+    assert row(values, "bias_repeatability")["of"] == "6 runs"
+    assert values["verdict"] == "accepted"
+    assert any("run1, run4: Earth rate is not known" in note for note in values["notes"])
+    # Where none states it, it is in all alike, and repeatability is of all.
+    alike = [Run.from_columns(one.name, Facts(unit=UP.unit, axis=UP.axis), **one.columns) for one in runs]
+    told = row(acceptance_json(alike), "bias_repeatability")
+    assert told["before"] == pytest.approx(np.std(biases, ddof=1), abs=1e-4)
