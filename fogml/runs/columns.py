@@ -139,10 +139,12 @@ def conversion(name: str, unit: str | None, file: str) -> tuple[float, float]:
         return 1.0, 0.0
     accepted = ", ".join(spec.units)
     if unit is None:
-        raise InputError(
-            f"{file}: column '{name}' states no unit; write '{name} [{spec.internal}]' "
-            f"in the header (accepted: {accepted})"
-        )
+        how = f"write '{name} [{spec.internal}]' in the header"
+        if file.lower().endswith(".mat"):
+            how = f"save a struct 'units' with a field of the variable's name that holds '{spec.internal}'"
+        elif file.lower().endswith((".h5", ".hdf5")):
+            how = f"give the dataset an attribute 'unit' that holds '{spec.internal}'"
+        raise InputError(f"{file}: column '{name}' states no unit; {how} (accepted: {accepted})")
     found = spec.units.get(unit) or converted(unit, spec.internal)
     if found is None:
         angle = converted(unit, "deg") if spec.internal in ("deg/h", "deg/s") else None

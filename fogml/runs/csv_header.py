@@ -103,6 +103,10 @@ class Header:
         return is_gyro and ("time" in names or any(name.lower() in DATE_NAMES for name in names))
 
 
+_LEAST_MERGED = 2
+"""Texts in a row of a header; a row of one is a title."""
+
+
 def find_header(lines: Sequence[str]) -> Header | None:
     """The header among a file's first lines; None where all of them are blank.
 
@@ -166,13 +170,21 @@ def is_number_like(field: str) -> bool:
 def _header(lines: Sequence[str], i: int, separator: str | None) -> Header:
     text = uncommented(lines[i])
     separator = separator or _separator(text, lines[i + 1 : i + 1 + _LINES_BELOW])
-    cells = _cells(fields_of(text, separator))
+    cells = _cells(_merged(lines, i, fields_of(text, separator), separator))
     below = next((j for j in range(i + 1, len(lines)) if lines[j].strip()), None)
     if below is not None:
         units = with_units_below(cells, fields_of(uncommented(lines[below]), separator))
         if units is not None:
             return Header(i, below + 1, separator, units)
     return Header(i, i + 1, separator, canonical_cells(cells))
+
+
+def _merged(lines: Sequence[str], i: int, fields: list[str], separator: str) -> list[str]:
+    """The fields of a line; where one has no text, that above, as of cells merged over two rows."""
+    above = fields_of(uncommented(lines[i - 1]), separator) if i and not all(map(str.strip, fields)) else []
+    if len(above) != len(fields) or sum(bool(cell.strip()) for cell in above) < _LEAST_MERGED:
+        return fields
+    return [field if field.strip() else upper for field, upper in zip(fields, above, strict=True)]
 
 
 def _separator(header: str, below: Sequence[str]) -> str:

@@ -17,10 +17,18 @@ _SYNONYMS = {
     "time": ("t", "timestamp", "datetime", "date/time", "dateandtime", "elapsed", "elapsedtime", "zeit",
              "uhrzeit", "时间", "indexlevel0"),
     "gyro": ("gyroscope", "gyrooutput", "gyrorate", "fog", "fogoutput", "fograte", "omega", "ω",
-             "angularrate", "angularvelocity", "rotationrate", "drehrate", "陀螺", "陀螺输出", "角速度"),
-    "T": ("temp", "temperature", "temperatur", "温度",
+             "angularrate", "angularvelocity", "rotationrate", "drehrate", "kreisel",
+             "kreiselausgang", "陀螺", "陀螺输出", "陀螺仪", "陀螺仪输出", "角速度"),
+    "T": ("temp", "temperature", "temperatur", "spulentemperatur", "温度", "线圈温度", "光纤环温度",
           *(name for of in _OF_THE_GYRO for name in (f"t{of}", *(of + word for word in _WARM)))),
-    **{f"T_{of}": tuple(of + word for word in _WARM) for of in ("chamber", "case", "electronics")},
+    **{
+        f"T_{of}": (*(of + word for word in _WARM), *words)
+        for of, words in (
+            ("chamber", ("kammertemperatur", "温箱温度", "箱温")),
+            ("case", ("gehäusetemperatur", "壳体温度", "外壳温度")),
+            ("electronics", ("elektroniktemperatur", "电路温度")),
+        )
+    },
 }  # fmt: skip
 _SPELLED = {re.sub(r"[\s_-]", "", name.lower()): name for name in KNOWN}
 _MEANT = {re.sub(r"[\s_-]", "", word): name for name, words in _SYNONYMS.items() for word in words}

@@ -34,6 +34,7 @@ _AXIS = re.compile(r"([xyz])\W*\Z", re.IGNORECASE)
 _UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
 _FEW_VALUES = 20  # of 200: a state, a flag; the noise of a gyro takes more
 _TAIL_BYTES = 1 << 12
+_DAYS = (30_000.0, 80_000.0)  # since 1900, of the years 1982 to 2119
 _KELVIN = 200.0  # no chamber is so hot in degC, and none so cold in kelvin
 _MARK = "# GUESS: "
 
@@ -234,9 +235,8 @@ def _clock(left: list[_Field]) -> list[str]:
         sources = [_quoted(f.source) for f in stamped[:2]]
         shown = f"[{', '.join(sources)}]" if len(sources) > 1 else sources[0]
         return [f"  time: {{source: {shown}, unit: stamp}}"]
-    known = [f for f in left if f.name == "time" or _TIME.search(f.name)] or [f for f in left if _grows(f)][
-        :1
-    ]
+    named = [f for f in left if f.name == "time" or _TIME.search(f.name) or _DATE.search(f.name)]
+    known = named or [f for f in left if _grows(f)][:1]
     growing = [f for f in known if _grows(f) or not f.first]
     if not growing:
         return []
@@ -244,6 +244,9 @@ def _clock(left: list[_Field]) -> list[str]:
     left.remove(one)
     if one.unit is not None and is_accepted("time", one.unit):
         return [f"  time: {{source: {_quoted(one.source)}, unit: {one.unit}}}"]
+    if _DATE.search(one.name) and one.first and _DAYS[0] < np.median(one.numbers) < _DAYS[1]:
+        why = "days, as a spreadsheet counts them"
+        return [f"  time: {{source: {_quoted(one.source)}, unit: d}}    {_MARK}{why}"]
     unit = next((u for u, hint in _UNIT_IN_NAME if re.search(hint, one.name, re.IGNORECASE)), "s")
     step = f"steps of {np.median(np.diff(one.numbers)):.6g}; " if len(one.first) > 1 else ""
     return [f"  time: {{source: {_quoted(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"]

@@ -309,3 +309,21 @@ def test_repair_refuses_what_is_too_long_to_be_held(tmp_path):
         InputError, match=r"log\.npz: 0 MB, and --repair holds a file in memory, up to 0 MB; cut"
     ):
         read_run(tmp_path / "log.npz", repair=True, limits=limits)
+
+
+def test_units_stated_as_the_message_says_are_read(tmp_path):
+    held = {"t": TIME, "omega": GYRO, "Tin": WARM}
+    savemat(tmp_path / "log.mat", held)
+    with pytest.raises(InputError, match="save a struct 'units' with a field of the variable's name"):
+        read_run(tmp_path / "log.mat")
+    savemat(tmp_path / "log.mat", {**held, "units": {"t": "s", "omega": "deg/h", "Tin": "degC"}})
+    np.testing.assert_array_equal(read_run(tmp_path / "log.mat").gyro, GYRO)
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, values in (("time", TIME), ("gyro", GYRO)):
+            file[name] = values
+    with pytest.raises(InputError, match="give the dataset an attribute 'unit' that holds 'deg/h'"):
+        read_run(tmp_path / "log.h5")
+    with h5py.File(tmp_path / "log.h5", "a") as file:
+        file["time"].attrs["unit"], file["gyro"].attrs["unit"] = "s", "deg/h"
+    np.testing.assert_array_equal(read_run(tmp_path / "log.h5").gyro, GYRO)

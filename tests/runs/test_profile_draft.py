@@ -138,3 +138,14 @@ def test_the_profiles_of_the_guide_are_valid(tmp_path):
         path.write_text(head + block, encoding="utf-8")
         assert load_profile(path).columns["gyro"].unit
     assert len(profiles) == 4
+
+
+def test_days_of_a_spreadsheet_are_told(tmp_path):
+    path, profile = tmp_path / "log.csv", tmp_path / "profile.yaml"
+    seconds = 10.0 * np.arange(300)
+    rows = [f"{46000.0 + t / 86400.0:.9f};{np.sin(t):.4f};{20.0 + t / 1000.0:.2f}" for t in seconds]
+    path.write_text("\n".join(["Datum;gyro [deg/h];T_in [degC]", *rows, ""]))
+    profile.write_text(draft_profile(path))
+    assert "unit: d}" in profile.read_text() and "as a spreadsheet counts them" in profile.read_text()
+    (run,) = import_recording(path, profile)
+    np.testing.assert_allclose(run.time, seconds, atol=1e-3)
