@@ -13,7 +13,7 @@ import numpy as np
 
 from fogml.arrays import IntArray
 from fogml.cli.model_commands import CompensateSettings
-from fogml.cli.runs import open_blocks
+from fogml.cli.runs import note_wrong, open_blocks
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.runs.findings import dead_words
@@ -43,6 +43,8 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     # The run is looked into first: one of three axes takes a model each.
     blocks = iter(open_blocks(settings.run, repair=settings.repair, axis=settings.axis))
     begun = list(islice(blocks, 1))
+    for first in begun:
+        note_wrong(first, terminal)
     model = load_model(settings.model)
     total = _expected_rows(settings.run)
     with (

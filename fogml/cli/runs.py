@@ -90,6 +90,15 @@ def open_runs(
     return runs
 
 
+def note_wrong(first: Run, terminal: Terminal) -> None:
+    """Note on stderr what makes every figure wrong, by the first block of a run that is read in blocks."""
+    from fogml.runs.checks import check_run
+
+    for finding in check_run(first):
+        if finding.code in FIRST_OF_ALL:
+            terminal.note(f"{first.name}: {finding.message}")
+
+
 Values = dict[str, Any]
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from fogml.cli.fleet_unit import UnitWork
 from fogml.cli.run_commands import FleetSettings, MonitorSettings
-from fogml.cli.runs import check_named_once, open_blocks
+from fogml.cli.runs import check_named_once, note_wrong, open_blocks
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError, counted
 from fogml.fleet.engines import run_tasks
@@ -258,6 +258,7 @@ def _records(settings: MonitorSettings, terminal: Terminal) -> list[RunRecord]:
             first = next(blocks, None)
             if first is None or len(first) == 0:
                 raise InputError(f"{path}: holds no samples, there is nothing to monitor")
+            note_wrong(first, terminal)
             record = record_run(
                 model_of(first),
                 chain([first], blocks),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from tests.monitor.service import write_model, write_run
@@ -55,6 +56,22 @@ def test_a_bad_run_loses_none_and_doubles_none(service, tmp_path, invoke):
     assert "FOG-9" in invoke("monitor", model, other, "-o", out, status=2).stderr
     assert "more than once" in invoke("monitor", model, runs[0], runs[0], "-o", out, status=2).stderr
     assert "the store holds none" in invoke("monitor", model, "-o", out, status=2).stderr
+
+
+def test_a_run_of_another_unit_of_temperature_is_said(service, tmp_path, invoke):
+    """In blocks as whole: before, monitor and compensate took kelvin under degC in silence."""
+    model, runs = service
+    table = np.loadtxt(runs[0], delimiter=",", skiprows=1)
+    table[:, 2] += 273.15
+    path = tmp_path / "kelvin.csv"
+    np.savetxt(path, table, "%.6f", ",", header="time [s],gyro [deg/h],T [degC]", comments="")
+    path.with_suffix(".yaml").write_text(runs[0].with_suffix(".yaml").read_text())
+    for told in (
+        invoke("monitor", model, path, "-o", tmp_path / "out"),
+        invoke("compensate", path, "--model", model, "-o", tmp_path / "done.csv"),
+    ):
+        assert "kelvin.csv: 'T' is stated in degC" in told.stderr and "kelvin?" in told.stderr
+    assert "stated in" not in invoke("monitor", model, runs[1], "-o", tmp_path / "out").stderr
 
 
 def test_a_fleet_s_models_are_found_by_unit(tmp_path, invoke_json, invoke):
