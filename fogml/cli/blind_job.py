@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fogml.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.blind.folders import DIAGNOSIS, OUTCOME, BlindFolder, read_json
 from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSettings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, counted
@@ -169,6 +169,9 @@ def answer(
             partial.write_text(config, encoding="utf-8")
         told[str(plan.name)] = {"answered": answered, "failed": failed}
         terminal.say(f"{method}: {counted(answered, 'case')} answered in {plan.answers}, {failed} failed")
+        files = sorted(plan.answers.glob(f"*/{OUTCOME}")) if failed else []
+        if lost := next((told for told in (read_json(file) for file in files) if not told["done"]), None):
+            terminal.say(f"  case {lost['case']}: {lost['message']} (each says why in its {OUTCOME})")
     terminal.result(told)
 
 

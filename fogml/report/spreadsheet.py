@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ from fogml.validation.results import AveragedSeries, Judgement, Metrics, RunJudg
 if TYPE_CHECKING:
     from xlsxwriter.worksheet import Worksheet
 
+_NO_DATE = datetime(1980, 1, 1)
+"""When a workbook says it was made, as the archive that it is does: the same results are the same bytes."""
 SAFE_TEXT = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
 """Options of a workbook: names come from files, and no text may turn into a formula or a link."""
 _LONGEST_NAME = 31
@@ -85,6 +88,7 @@ def whole_workbook(path: str | Path) -> Iterator[Writer]:
     with whole_file(path) as partial:
         try:
             with xlsxwriter.Workbook(str(partial), SAFE_TEXT) as workbook:
+                workbook.set_properties({"created": _NO_DATE})
                 yield Writer(workbook)
         except FileCreateError as error:
             cause = error.args[0] if error.args else None

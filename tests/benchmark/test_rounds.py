@@ -214,3 +214,11 @@ def test_names_and_means() -> None:
 )
 def test_what_is_named_is_called_unknown_from_the_same_probability_on(unknown, wrong, told):
     assert _told_unknown(SimpleNamespace(unknown=unknown, wrong_name=wrong)) is told
+
+
+def test_a_method_that_fails_says_why_at_once(made: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def bent(case, out):\n    raise ValueError('no such bend')\n")
+    command = ["benchmark", "run", str(made), "--method", "mine:bent", "--code", str(tmp_path)]
+    ran = CliRunner().invoke(app, [*command, "--workers", "1"])
+    assert ran.exit_code == 0, ran.output
+    assert "1 failed" in ran.output and "case 0001: ValueError: no such bend" in ran.output

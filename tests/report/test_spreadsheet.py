@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from dataclasses import fields, replace
 from pathlib import Path
@@ -95,3 +96,11 @@ def test_nothing_is_left_where_it_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such folder"):
         spreadsheet(judgement(), tmp_path / "missing" / "report.xlsx")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_same_results_are_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("one.xlsx", "two.xlsx"):
+        spreadsheet(judgement(2), tmp_path / name)
+    assert (tmp_path / "one.xlsx").read_bytes() == (tmp_path / "two.xlsx").read_bytes()
+    with zipfile.ZipFile(tmp_path / "one.xlsx") as archive:
+        assert set(re.findall(rb"20\d\d-\d\d-\d\dT", archive.read("docProps/core.xml"))) == set()
