@@ -13,7 +13,7 @@ from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
-from fogml.runs.findings import FIRST_OF_ALL
+from fogml.runs.findings import DEAD, FIRST_OF_ALL
 from fogml.runs.run import Run
 
 
@@ -91,11 +91,14 @@ def open_runs(
 
 
 def note_wrong(first: Run, terminal: Terminal) -> None:
-    """Note on stderr what makes every figure wrong, by the first block of a run that is read in blocks."""
+    """Note on stderr what makes every figure wrong, by the first block of a run that is read in blocks.
+
+    That an output has one value is told of the whole run, where its blocks are used.
+    """
     from fogml.runs.checks import check_run
 
     for finding in check_run(first):
-        if finding.code in FIRST_OF_ALL:
+        if finding.code in FIRST_OF_ALL and finding.code != DEAD:
             terminal.note(f"{first.name}: {finding.message}")
 
 

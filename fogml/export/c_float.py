@@ -88,7 +88,10 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "exp_type": real,
         "phase_type": real,
         "held_type": "int64_t" if real == "double" else "int32_t",
-        "units": units_of(plan, gyro, temperature),
+        "units": [
+            *units_of(plan, gyro, temperature),
+            "An output that is no number (NaN) is given as one, whatever the flag, which is of the temperatures.",
+        ],
         "constants": _constants(plan, windows, dtype, real),
         "exp_error": EXP_ERROR[dtype],
         "exp_most": number(EXP_MOST[dtype]).removesuffix("f"),

@@ -492,3 +492,18 @@ def test_an_output_beyond_its_range_is_the_end_that_the_header_states(model_of, 
             given = np.clip(end + off, -most, most - 2.0**-12) + np.zeros(len(run))
             found, _ = outputs(CProgram(source, tmp_path, flags=QUICK), source, run.with_columns(gyro=given))
             np.testing.assert_allclose(found, np.clip(given - drift, -most, most), atol=2.0**-11)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_an_output_that_is_no_number_stays_one_for_that_sample_alone(model_of, tmp_path, dtype):
+    source = c_source(Plan.of(model_of("M2")), dtype, [])
+    program, run = CProgram(source, tmp_path, flags=QUICK), training_run()[:60]
+    gyro = run.gyro.copy()
+    gyro[30] = np.nan
+    temperatures = np.column_stack([run.columns["T_in" if n == "T" else n] for n in source.plan.sensors])
+    sound, flags = program.steps(run.time, temperatures, run.gyro)
+    found, flags_beside = program.steps(run.time, temperatures, gyro)
+    np.testing.assert_array_equal(flags_beside, flags)
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(found)), [30])
+    np.testing.assert_array_equal(np.delete(found, 30), np.delete(sound, 30))
+    assert "no number (NaN) is given as one" in source.files["fogml_model.h"]
