@@ -90,7 +90,7 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "held_type": "int64_t" if real == "double" else "int32_t",
         "units": [
             *units_of(plan, gyro, temperature),
-            "An output that is no number (NaN) is given as one, whatever the flag, which is of the temperatures.",
+            "An output that is no number (NaN) is given as one; the flag is of the temperatures alone.",
         ],
         "constants": _constants(plan, windows, dtype, real),
         "exp_error": EXP_ERROR[dtype],
