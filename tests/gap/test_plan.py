@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.gap.planning.fisher import expected, information, merit, responses, unknowns
+from fogml.gap.planning.fisher import covariance, expected, information, merit, responses, unknowns
 from fogml.gap.planning.plan import plan_runs
 from fogml.gap.planning.plan_result import plan_values
 from fogml.gap.planning.programme_design import Design
@@ -116,11 +116,24 @@ def test_expected_errors_are_those_of_fits_whose_prior_is_the_plan(rehearsed):
         output = table @ true + rng.standard_normal(len(table))
         fit = np.linalg.solve(table.T @ table + np.diag(precision), table.T @ output)
         errors.append((fit - true)[list(of.wanted)])
-    promised = np.sqrt(np.diag(expected(rehearsal, of)))[list(of.wanted)]
-    np.testing.assert_allclose(promised, np.sqrt(np.mean(np.square(errors), axis=0)), rtol=0.15)
-    # At the plan's own width it would be less.
-    alone = np.sqrt(np.linalg.inv(information(rehearsal, of))[-1, -1])
-    assert promised[1] > 1.2 * alone
+    size, width = np.sqrt(np.diag(expected(rehearsal, of)))[list(of.wanted)]
+    found = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert width == pytest.approx(found[1], rel=0.15)
+    # At the plan's own width it would be less; the size's is that.
+    alone = np.sqrt(np.diag(np.linalg.inv(information(rehearsal, of))))[list(of.wanted)]
+    assert width > 1.2 * alone[1] and size == pytest.approx(alone[0])
+
+
+def test_no_shape_is_expected_to_be_told_worse_than_beforehand(rehearsed):
+    """Nor a size not at all, where a programme shows nothing of some of the shapes, as of a fringe jump."""
+    on, rehearsal = rehearsed
+    for id in ("radiation", "fringe_jump", "sf_hysteresis", "ageing"):
+        of = unknowns(on, [id])
+        planned, promised = covariance(information(rehearsal, of)), expected(rehearsal, of)
+        shapes = [i for i in of.wanted if not of.parameters[i].name.endswith("amplitude")]
+        assert np.all(np.diag(promised)[shapes] <= np.maximum(1.0, np.diag(planned)[shapes]) * (1.0 + 1e-9))
+        others = [i for i in range(len(planned)) if i not in shapes]
+        np.testing.assert_allclose(np.diag(promised)[others], np.diag(planned)[others])
 
 
 def test_a_plan_promises_what_it_finds_and_repeats():

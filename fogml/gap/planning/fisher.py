@@ -3,8 +3,8 @@
 With whitened responses J of the output to all unknowns and normal priors of precision P the information is
 ``J'J + P``, its inverse V the covariance that a fit of all unknowns together expects. J is that at one shape
 of each effect; the truth has another, which the prior draws towards the one planned with. Where that is off
-by d the squared errors are ``V + V (P d d' P - P) V``, V at the truth; promised is their mean over shapes as
-the catalogue spreads them.
+by d the squared errors are ``V + V (P d d' P - P) V``, V at the truth; of a shape their mean over shapes as
+the catalogue spreads them is promised.
 """
 
 from __future__ import annotations
@@ -186,27 +186,38 @@ def covariance(info: FloatArray) -> FloatArray:
 
 
 def expected(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
-    """Expected mean squares and products of a fit's errors, in scales, shape (p, p); over shapes as usual."""
+    """Expected mean squares and products of a fit's errors, in scales, shape (p, p).
+
+    Those of constants and amplitudes are of the shapes that are planned with, as a programme may show nothing
+    of others; those of shapes are over the shapes as usual, and no more than is known beforehand.
+    """
+    planned = covariance(information(rehearsal, of))
     held = {(one.id, name): value for one in of.effects for name, value in one.shape.items()}
     if not held:
-        return covariance(information(rehearsal, of))
+        return planned
     place = {p.name: i for i, p in enumerate(of.parameters)}
+    rows = [place[".".join(key)] for key in held]
     prior = np.diag(of.prior_information())
     spreads = {key: _spread(effect(key[0]), key[1], rehearsal.stage.model.grade) for key in held}
-    total = np.zeros((len(prior), len(prior)))
+    squares = np.zeros(len(prior))
     for deviates in ndtri(_even_shares(_SHAPES, len(held))):
-        true, pull = dict(held), np.zeros_like(total)
-        for (key, value), z in zip(held.items(), deviates, strict=True):
-            i, (factor, sd, limits) = place[".".join(key)], spreads[key]
-            true[key] = float(np.clip(value * math.exp(factor * z) + sd * z, *limits))
+        true, pull = dict(held), np.zeros_like(planned)
+        for (key, value), i, z in zip(held.items(), rows, deviates, strict=True):
+            factor, sd, (low, high) = spreads[key]
+            # Where a step either way is possible too.
+            step = _SHAPE_STEP * of.parameters[i].scale
+            true[key] = float(np.clip(value * math.exp(factor * z) + sd * z, low + step, high - step))
             if factor:
                 # Of a normal one the mean square off the plan is the prior's, and nothing is left.
                 off = (true[key] - value) / of.parameters[i].scale
                 pull[i, i] = (prior[i] * off) ** 2 - prior[i]
         shapes = [replace(one, shape={n: true[one.id, n] for n in one.shape}) for one in of.effects]
         found = covariance(information(rehearsal, replace(of, effects=tuple(shapes))))
-        total += found + found @ pull @ found
-    return total / _SHAPES
+        squares += np.diag(found + found @ pull @ found) / _SHAPES
+    grown = np.ones(len(prior))
+    own = np.diag(planned)[rows]
+    grown[rows] = np.sqrt(np.maximum(np.minimum(squares[rows], 1.0 / prior[rows]) / own, 1.0))
+    return np.asarray(planned * np.outer(grown, grown))
 
 
 def _spread(declared: Effect, name: str, grade: Grade) -> tuple[float, float, tuple[float, float]]:

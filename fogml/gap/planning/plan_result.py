@@ -34,8 +34,8 @@ class ExpectedError:
     prior
         Standard deviation beforehand; None for an amplitude.
     se
-        Expected standard error, of effects the root mean square over shapes as the catalogue spreads them
-        about the plan's; None where the runs don't show it.
+        Expected standard error, of an effect's shape the root mean square over shapes as the catalogue
+        spreads them about the plan's; None where the runs don't show it.
     """
 
     name: str
