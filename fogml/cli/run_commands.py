@@ -202,7 +202,8 @@ class MonitorSettings(Settings):
 
     Keeps a few figures of every run in a store and judges all runs of each unit in their order: repeated and
     late runs change nothing but their place. Writes monitor.json, monitor.html, a page per unit and
-    monitor.config.yaml. Exit status 1 if a unit has changed.
+    monitor.config.yaml. A run that can't be used is told and holds up no other. Exit status 1 if a unit has
+    changed or a run can't be used.
     """
 
     job: ClassVar[str] = "fogml.cli.unit_jobs:monitor_and_write"

@@ -202,7 +202,7 @@ FLEET = "fleet.json"
 
 
 def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
-    """Keep new runs, judge every unit's, write and print it; whether no unit has changed."""
+    """Keep new runs, judge every unit's, write and print it; whether all were used and no unit changed."""
     from fogml.report.monitor_page import monitor_page, unit_file, unit_page
 
     if not settings.model:
@@ -210,7 +210,7 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
     home = Path(settings.out)
     if home.exists() and not home.is_dir():
         raise InputError(f"{home}: is a file, a folder was expected; choose another --out")
-    records = _records(settings, terminal)
+    records, refused = _records(settings, terminal)
     place = settings.store or str(home / "store")
     with closing(open_store(place, settings.patience)) as store, terminal.work("keeping runs"):
         added = store.add(records) if records else 0
@@ -230,6 +230,7 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
             wander=settings.wander,
             added=added,
             repeated=len(records) - added,
+            refused=refused,
         )
     )
     with terminal.work("drawing"), whole_folder(home, shared=True) as folder:
@@ -243,31 +244,40 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
     _print_monitor(values, terminal)
     terminal.result(values)
     terminal.say(f"Written to {settings.out}: open {home / 'monitor.html'}")
-    return all(unit["state"] != "alarm" for unit in values["units"])
+    return not refused and all(unit["state"] != "alarm" for unit in values["units"])
 
 
-def _records(settings: MonitorSettings, terminal: Terminal) -> list[RunRecord]:
+def _records(settings: MonitorSettings, terminal: Terminal) -> tuple[list[RunRecord], dict[str, str]]:
+    """What is kept of each run, and why others can't be used; an error where none can."""
     assert settings.model
     check_named_once(settings.runs)
     model_of = _models(Path(settings.model))
-    records = []
+    records, refused = [], dict[str, str]()
     with terminal.work("monitoring", total=len(settings.runs)) as work:
         for path in settings.runs:
             work.doing(f"monitoring {path}")
-            blocks = iter(open_blocks(path, repair=settings.repair))
-            first = next(blocks, None)
-            if first is None or len(first) == 0:
-                raise InputError(f"{path}: holds no samples, there is nothing to monitor")
-            note_wrong(first, terminal)
-            record = record_run(
-                model_of(first),
-                chain([first], blocks),
-                averaging_s=settings.averaging,
-                any_unit=settings.any_unit,
-            )
-            records.append(record)
+            try:
+                records.append(_record(path, model_of, settings, terminal))
+            except InputError as error:
+                refused[str(path)] = str(error)
             work.advance()
-    return records
+    if refused and not records:
+        raise InputError(next(iter(refused.values())))
+    for reason in refused.values():
+        terminal.note(f"not used: {reason}")
+    return records, refused
+
+
+def _record(
+    path: str, model_of: Callable[[Run], DriftModel], settings: MonitorSettings, terminal: Terminal
+) -> RunRecord:
+    blocks = iter(open_blocks(path, repair=settings.repair))
+    first = next(blocks, None)
+    if first is None or len(first) == 0:
+        raise InputError(f"{path}: holds no samples, there is nothing to monitor")
+    note_wrong(first, terminal)
+    rest, any_unit = chain([first], blocks), settings.any_unit
+    return record_run(model_of(first), rest, averaging_s=settings.averaging, any_unit=any_unit)
 
 
 def _models(place: Path) -> Callable[[Run], DriftModel]:

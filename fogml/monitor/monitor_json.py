@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -22,6 +22,7 @@ def monitor_json(
     wander: bool = True,
     added: int,
     repeated: int,
+    refused: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """What is known of units in service.
 
@@ -35,12 +36,15 @@ def monitor_json(
         Whether a bias that wanders counted as no change.
     added, repeated
         Runs that are new, and runs that the store held before.
+    refused
+        Runs that can't be used, and why.
     """
     return {
         "schema": SCHEMA,
         "runs_between_false_alarms": runs_between_false_alarms,
         "wander": wander,
         "runs": {"added": added, "repeated": repeated},
+        "refused": [{"run": run, "reason": reason} for run, reason in (refused or {}).items()],
         "figures": dict(FIGURES),
         "units": [_unit(unit) for unit in units],
     }

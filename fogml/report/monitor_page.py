@@ -69,6 +69,7 @@ def monitor_page(monitor: Mapping[str, Any]) -> str:
             ),
             Tile("Runs", str(runs), "", f"{monitor['runs']['added']} new"),
         ],
+        refused=[(each["run"], each["reason"]) for each in monitor.get("refused", ())],
         changed=[(unit_label(unit), alarm_words(unit["alarms"][-1])) for unit in changed],
         levels=levels(units),
         links=[(unit_label(unit), f"units/{unit_file(unit)}", state_words(unit)) for unit in units],

@@ -45,13 +45,24 @@ def test_a_unit_that_changes_is_noticed_once_and_for_all(service, tmp_path, invo
     assert len(list((out / "units").iterdir())) == 1
 
 
-def test_a_bad_run_loses_none_and_doubles_none(service, tmp_path, invoke):
+def test_a_run_that_cannot_be_used_is_told_and_holds_up_no_other(service, tmp_path, invoke, invoke_json):
     model, runs = service
     (tmp_path / "bad.csv").write_text("time [s],gyro [deg/h],T [degC]\n1,2,3\n")
     out = tmp_path / "out"
-    told = invoke("monitor", model, runs[0], tmp_path / "bad.csv", "-o", out, status=2)
+    told = invoke("monitor", model, tmp_path / "bad.csv", "-o", out, status=2)
     assert "bad.csv" in told.stderr
     assert not out.exists()
+    told = invoke_json("monitor", model, tmp_path / "bad.csv", runs[0], "-o", out, status=1)
+    (refused,) = told["refused"]
+    assert refused["run"] == str(tmp_path / "bad.csv") and "bad.csv" in refused["reason"]
+    assert told["runs"] == {"added": 1, "repeated": 0} and told["units"][0]["state"] == "baseline"
+    assert "Runs that were not used" in (out / "monitor.html").read_text()
+    assert invoke_json("monitor", model, "-o", out)["refused"] == []
+
+
+def test_a_stranger_or_a_run_named_twice_is_refused(service, tmp_path, invoke):
+    model, runs = service
+    out = tmp_path / "out"
     other = write_run(tmp_path, 3, unit="FOG-9")
     assert "FOG-9" in invoke("monitor", model, other, "-o", out, status=2).stderr
     assert "more than once" in invoke("monitor", model, runs[0], runs[0], "-o", out, status=2).stderr
