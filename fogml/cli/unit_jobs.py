@@ -223,16 +223,16 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
         bias_limit=settings.bias_limit,
         prior=ChangePrior() if settings.wander else ChangePrior().steady(),
     )
-    values = finite_json(
-        monitor_json(
-            units,
-            runs_between_false_alarms=settings.false_alarm_every,
-            wander=settings.wander,
-            added=added,
-            repeated=len(records) - added,
-            refused=refused,
-        )
+    every, repeated = settings.false_alarm_every, len(records) - added
+    told = monitor_json(
+        units,
+        runs_between_false_alarms=every,
+        wander=settings.wander,
+        added=added,
+        repeated=repeated,
+        refused=refused,
     )
+    values = finite_json(told)
     with terminal.work("drawing"), whole_folder(home, shared=True) as folder:
         write_json(folder / "monitor.json", values, indent=1)
         (folder / "monitor.html").write_text(monitor_page(values), encoding="utf-8")

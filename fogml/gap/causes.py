@@ -16,13 +16,14 @@ from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import LinearGaussian, Posterior
 from fogml.gap.model import EffectValue
+from fogml.gap.node_values import NodeValue, node_value
 from fogml.gap.posterior import Cause, Judgement
 from fogml.gap.result import NAMED, Estimate, Found, RunAmplitude
 from fogml.gap.result_parts import Onset
 from fogml.gap.rows import Rows
 from fogml.gap.scene import Scene
 from fogml.gap.settings import Reported
-from fogml.gap.shapes import AT_AMPLITUDE, GridNode, is_angle
+from fogml.gap.shapes import AT_AMPLITUDE, is_angle
 from fogml.runs.steps import FINEST_STEP_DEGC, WHOLE, recorded_step
 from fogml.signals.distributions import chi2_sf
 from fogml.twin.effect import Effect
@@ -80,7 +81,7 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
     most = setting.priors.reported.card_nodes
     by_run = [[b.columns for b in islice(build(r, scene, setting.values), most)] for r in scene.fit]
     stacked = field.whitening.stacked([np.concatenate(columns, axis=1) for columns in by_run])
-    gains, values, spreads = [], [], []
+    told_by = []
     largest = max(map(abs, declared.amplitude.limits))
     at = 0
     for i, first in enumerate(by_run[0]):
@@ -92,25 +93,30 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
         scale = np.sqrt(np.maximum(np.diagonal(gram), 0.0))
         scale = np.where(scale * largest >= 1.0, scale, np.inf)
         scales = np.outer(scale, scale)
-        inverse = np.linalg.pinv(gram / scales, rcond=1e-6, hermitian=True) / scales
-        coefficients = inverse @ fits
-        gains.append(0.5 * float(fits @ coefficients) - width)
-        values.append(_value(declared, node, node.mix @ coefficients))
-        spreads.append(node.mix @ inverse @ node.mix.T)
-    best = int(np.argmax(gains))
-    amplitude, told = values[best]
-    ones = np.ones(len(spreads[best]))
-    se = math.sqrt(max(float(ones @ spreads[best] @ ones), 0.0))
-    weights = np.exp(np.clip(np.array(gains) - max(gains), -50.0, 0.0))
+        coefficients = (np.linalg.pinv(gram / scales, rcond=1e-6, hermitian=True) / scales) @ fits
+        back = np.where(np.isfinite(scale), 1.0, 0.0)[:, None] * np.linalg.inv(node.mix)
+        told_by.append((0.5 * float(fits @ coefficients), node, coefficients, back.T @ gram @ back))
+    found: list[tuple[float, NodeValue]] = []
+    for gain, node, coefficients, information in sorted(told_by, key=lambda told: -told[0]):
+        if found and gain < max(gain for gain, _ in found) - setting.priors.hopeless:
+            break
+        value = node_value(declared, node, node.mix @ coefficients, information)
+        found.append((gain - 0.5 * value.misfit - value.count, value))
+    gains = np.array([gain for gain, _ in found])
+    best = found[int(np.argmax(gains))][1]
+    weights = np.exp(gains - gains.max())
     weights /= weights.sum()
-    sizes = np.clip([a for a, _ in values], -largest, largest)
-    amplitude = float(np.clip(amplitude, -largest, largest))
+    told = best.shape
+    amplitude = float(np.clip(best.amplitude, -largest, largest))
+    sizes = np.clip([value.amplitude for _, value in found], -largest, largest)
     form = setting.priors.form_error * amplitude
-    se = math.sqrt(se**2 + float(weights @ (sizes - amplitude) ** 2) + form**2)
-    shape_se = {
-        name: math.sqrt(float(weights @ np.array([(v.get(name, x) - x) ** 2 for _, v in values])))
-        for name, x in told.items()
-    }
+    se = math.sqrt(best.amplitude_se**2 + float(weights @ (sizes - amplitude) ** 2) + form**2)
+    angles = {q.name for q in declared.shape if is_angle(q)}
+    shape_se = {}
+    for name, x in told.items():
+        off = np.array([value.shape.get(name, x) - x for _, value in found])
+        off = (off + 180.0) % 360.0 - 180.0 if name in angles else off
+        shape_se[name] = math.hypot(best.shape_se.get(name, 0.0), math.sqrt(float(weights @ off**2)))
     shape |= {k: v for k, v in told.items() if k != AT_AMPLITUDE}
     if not declared.amplitude.signed:
         amplitude = abs(amplitude)
@@ -125,27 +131,6 @@ def _step(runs: Sequence[Rows], amplitude: float, se: float) -> tuple[float, flo
     held = [recorded_step(r.run.columns[name]) for r in runs for name in r.run.temperature_columns]
     step = max(held, default=0.0)
     return (step, 0.5 * WHOLE * step) if step >= FINEST_STEP_DEGC else (amplitude, se)
-
-
-def _value(declared: Effect, node: GridNode, weights: FloatArray) -> tuple[float, dict[str, float]]:
-    """Amplitude and shape of a node's draws with weights."""
-    angles = [q for q in declared.shape if is_angle(q)]
-    told = {k: float(v) for k, v in node.shape.items()}
-    if angles and node.turns == 2:
-        table = weights.reshape(-1, 2).sum(axis=0)
-        told[angles[0].name] = float(np.degrees(np.arctan2(table[1], table[0])) % 360.0)
-        return float(np.hypot(*table)), told
-    if node.turns > 1:
-        return float(np.abs(weights).max()), told
-    amplitude, middle = float(weights.sum()), node.draws[0]
-    for draw, weight in zip(node.draws[1:], weights[1:]):
-        for q in declared.shape:
-            step = float(draw.get(q.name, 0.0)) - float(middle.get(q.name, 0.0))
-            if step and amplitude:
-                low, high = q.range("tactical")
-                moved = float(middle[q.name]) + step * float(weight) / amplitude
-                told[q.name] = float(np.clip(moved, low - (high - low), high + (high - low)))
-    return amplitude, told
 
 
 def _drawn(declared: Effect, shape: Mapping[str, float], field: Field, beside: LinearGaussian) -> Card:

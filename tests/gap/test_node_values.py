@@ -1,0 +1,70 @@
+"""Amplitude, direction and shape of an effect as its card states them, against those that made the data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.gap.causes import card_of
+from fogml.gap.inference import foreseen
+from fogml.gap.model import TwinModel
+from fogml.gap.settings import STANDARD
+from fogml.runs.run import Run
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.twin_file import load_twin
+
+
+@pytest.fixture(scope="module")
+def field():
+    """Ten hours of a cycle, the table turned once an hour by a quarter, fields and duties recorded."""
+    time = 20.0 * np.arange(1800)
+    hours = time / 3600.0
+    temperature = 25.0 + 30.0 * np.sin(2.0 * np.pi * hours / 5.0)
+    angle = 90.0 * np.floor(hours)
+    turn = np.radians(angle)
+    columns = {
+        "T_in": temperature,
+        "T_out": temperature + 0.5 * np.cos(2.0 * np.pi * hours / 5.0) + 0.3 * np.sin(3.0 * hours),
+        "rate": np.gradient(angle, time) * (np.abs(np.gradient(angle, time)) > 0.0),
+        "angle": angle,
+        "B_x": 20.0 * np.cos(turn),
+        "B_y": -20.0 * np.sin(turn),
+        "B_z": -40.0 + 5.0 * np.sin(hours),
+        "supply": 12.0 + 0.05 * np.sin(2.0 * hours),
+    }
+    run = Run.from_columns("a", time=time, gyro=np.zeros(len(time)), **columns)
+    return foreseen(TwinModel(load_twin("nominal")), [run], NoiseModel(0.005, 0.0, 0.0), STANDARD).field
+
+
+MADE = (
+    ("magnetic", -0.4, {"phase": 309.0, "axial_ratio": 0.4}),
+    ("magnetic", 0.4, {"phase": 20.0, "axial_ratio": 0.15}),
+    ("azimuthal_gradient", 3.0, {"phase": 130.0}),
+    ("polarization_nonreciprocity", 0.4, {"period": 15.0, "phase": 77.0}),
+    ("supply_ripple", 3.0, {"ripple": 0.3, "phase": 200.0}),
+    ("chamber_pickup", 0.4, {"phase": 100.0}),
+)
+
+
+@pytest.mark.parametrize(("id", "amplitude", "stated"), MADE, ids=[f"{m[0]}{m[1]:+g}" for m in MADE])
+def test_size_and_direction_are_those_that_made_the_data(field, id, amplitude, stated):
+    """(A, phi) and (-A, phi + 180 deg) are one where all of the response turns with phi."""
+    declared = field.setting.scene.candidates[id]
+    shape = declared.default_shape("tactical") | stated
+    made = field.response(declared, shape, amplitude)
+    inside = []
+    for seed in range(6):
+        noise = np.random.default_rng(seed).standard_normal(len(made))
+        card = card_of(id, field, replace(field.base, data=made + noise), {})
+        size, phase = card.value.amplitude, card.value.shape["phase"]
+        turned = 180.0 if size * amplitude < 0.0 else 0.0
+        off = (phase - shape["phase"] + turned + 180.0) % 360.0 - 180.0
+        assert abs(abs(size) - abs(amplitude)) < 4.0 * card.amplitude_se
+        if id == "chamber_pickup":
+            # Four square waves a quarter of a period apart hold one between them to some ten degrees.
+            inside.append(abs(off) < 15.0)
+            continue
+        assert abs(off) < 4.0 * card.shape_se["phase"]
+        inside.append(abs(off) < 1.645 * card.shape_se["phase"])
+        assert card.amplitude_se < 0.3 * abs(amplitude)
+    assert sum(inside) >= 3, "of six 90 % intervals fewer hold by chance but once in a thousand"
