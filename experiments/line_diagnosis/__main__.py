@@ -31,9 +31,9 @@ from fogml.blind.frame.form import Form
 from fogml.blind.frame.strength import Acting
 from fogml.blind.make import recorded_run
 from fogml.blind.plan import Plan
+from fogml.cli.fleet_job import fleet_and_write
 from fogml.cli.run_commands import FleetSettings
 from fogml.cli.terminal import Terminal
-from fogml.cli.unit_jobs import fleet_and_write
 from fogml.fleet.tasks import OUTCOME
 from fogml.gap.result import NAMED
 from fogml.runs.writing import write_run

@@ -145,7 +145,7 @@ class FleetSettings(options.LimitSettings):
     batch.json, batch.html and batch.xlsx too. Exit status 1 if a unit failed or misses a limit.
     """
 
-    job: ClassVar[str] = "fogml.cli.unit_jobs:fleet_and_write"
+    job: ClassVar[str] = "fogml.cli.fleet_job:fleet_and_write"
     manifest: Annotated[
         str | None,
         argument("MANIFEST", "CSV or YAML of units: unit, job, train, test, axis.", reads=True),
@@ -206,7 +206,7 @@ class MonitorSettings(Settings):
     changed or a run can't be used.
     """
 
-    job: ClassVar[str] = "fogml.cli.unit_jobs:monitor_and_write"
+    job: ClassVar[str] = "fogml.cli.monitor_job:monitor_and_write"
     model: Annotated[
         str | None,
         argument("MODEL", "Folder of the model, or of a fleet's results with a model per unit.", reads=True),

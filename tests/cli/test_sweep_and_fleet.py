@@ -8,7 +8,7 @@ import os
 import pytest
 import yaml
 
-from fogml.cli.unit_jobs import batch_of
+from fogml.cli.fleet_job import batch_of
 from fogml.errors import InputError
 from fogml.fleet.tasks import DONE
 from tests.fleet.units import write_fleet, write_run

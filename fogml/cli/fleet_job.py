@@ -1,33 +1,22 @@
-"""The jobs of ``fogml fleet``, with the batch of its acceptance reports, and of ``fogml monitor``."""
+"""The job of ``fogml fleet``, with the batch of its acceptance reports."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
-from functools import cache
-from itertools import chain
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from fogml.cli.fleet_unit import UnitWork
-from fogml.cli.run_commands import FleetSettings, MonitorSettings
-from fogml.cli.runs import check_named_once, note_wrong, open_blocks
+from fogml.cli.run_commands import FleetSettings
 from fogml.cli.terminal import Terminal, Work, number
-from fogml.errors import InputError, counted
+from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json, label_of
 from fogml.fleet.tasks import DONE, Task, full_disk
 from fogml.json_files import finite_json, read_json, write_json
-from fogml.models.base import DriftModel
-from fogml.monitor.evidence import ChangePrior
-from fogml.monitor.monitor_json import monitor_json
-from fogml.monitor.record import RunRecord, record_run
-from fogml.monitor.store import open_store
-from fogml.monitor.watch import watch
 from fogml.outputs import sole_writer, whole_folder
-from fogml.runs.run import Run
 from fogml.runs.sources import sources_stamp
 from fogml.tracking import Tracker
 
@@ -196,142 +185,3 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     most = max(len(values[key]) for key in ("units", "outliers", "again"))
     if most > _SHOWN:
         terminal.say(f"The first {_SHOWN} of each are shown; fleet.html and fleet.xlsx hold all.")
-
-
-FLEET = "fleet.json"
-
-
-def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
-    """Keep new runs, judge every unit's, write and print it; whether all were used and no unit changed."""
-    from fogml.report.monitor_page import monitor_page, unit_file, unit_page
-
-    if not settings.model:
-        raise InputError("no model is given; name its folder, or that of a fleet's results")
-    home = Path(settings.out)
-    if home.exists() and not home.is_dir():
-        raise InputError(f"{home}: is a file, a folder was expected; choose another --out")
-    records, refused = _records(settings, terminal)
-    place = settings.store or str(home / "store")
-    with closing(open_store(place, settings.patience)) as store, terminal.work("keeping runs"):
-        added = store.add(records) if records else 0
-        held = store.records()
-    if not held:
-        raise InputError("no run is given, and the store holds none; name the runs to monitor")
-    units = watch(
-        held,
-        runs_between_false_alarms=settings.false_alarm_every,
-        bias_limit=settings.bias_limit,
-        prior=ChangePrior() if settings.wander else ChangePrior().steady(),
-    )
-    every, repeated = settings.false_alarm_every, len(records) - added
-    told = monitor_json(
-        units,
-        runs_between_false_alarms=every,
-        wander=settings.wander,
-        added=added,
-        repeated=repeated,
-        refused=refused,
-    )
-    values = finite_json(told)
-    with terminal.work("drawing"), whole_folder(home, shared=True) as folder:
-        write_json(folder / "monitor.json", values, indent=1)
-        (folder / "monitor.html").write_text(monitor_page(values), encoding="utf-8")
-        (folder / "units").mkdir()
-        for unit in values["units"]:
-            page = unit_page(unit, values["runs_between_false_alarms"])
-            (folder / "units" / unit_file(unit)).write_text(page, encoding="utf-8")
-        settings.write_into(folder, "monitor")
-    _print_monitor(values, terminal)
-    terminal.result(values)
-    terminal.say(f"Written to {settings.out}: open {home / 'monitor.html'}")
-    return not refused and all(unit["state"] != "alarm" for unit in values["units"])
-
-
-def _records(settings: MonitorSettings, terminal: Terminal) -> tuple[list[RunRecord], dict[str, str]]:
-    """What is kept of each run, and why others can't be used; an error where none can."""
-    assert settings.model
-    check_named_once(settings.runs)
-    model_of = _models(Path(settings.model))
-    records, refused = [], dict[str, str]()
-    with terminal.work("monitoring", total=len(settings.runs)) as work:
-        for path in settings.runs:
-            work.doing(f"monitoring {path}")
-            try:
-                records.append(_record(path, model_of, settings, terminal))
-            except InputError as error:
-                refused[str(path)] = str(error)
-            work.advance()
-    if refused and not records:
-        raise InputError(next(iter(refused.values())))
-    for reason in refused.values():
-        terminal.note(f"not used: {reason}")
-    return records, refused
-
-
-def _record(
-    path: str, model_of: Callable[[Run], DriftModel], settings: MonitorSettings, terminal: Terminal
-) -> RunRecord:
-    blocks = iter(open_blocks(path, repair=settings.repair))
-    first = next(blocks, None)
-    if first is None or len(first) == 0:
-        raise InputError(f"{path}: holds no samples, there is nothing to monitor")
-    note_wrong(first, terminal)
-    rest, any_unit = chain([first], blocks), settings.any_unit
-    return record_run(model_of(first), rest, averaging_s=settings.averaging, any_unit=any_unit)
-
-
-def _models(place: Path) -> Callable[[Run], DriftModel]:
-    """What gives a run's model: one for all, or of a fleet's results that of its unit and axis."""
-    from fogml.models.saved import load_model
-
-    if not (place / FLEET).is_file():
-        model = load_model(place)
-        return lambda run: model
-    fleet: dict[str, Any] = read_json(place / FLEET, "name the folder of a fleet's results")
-    try:
-        folders = {(unit["unit"], unit["axis"]): unit["folder"] for unit in fleet["units"]}
-    except (KeyError, TypeError):
-        raise InputError(f"{place / FLEET}: lists no units; run the fleet again") from None
-    load = cache(load_model)
-
-    def of_run(run: Run) -> DriftModel:
-        unit, axis = run.facts.unit or "", run.facts.axis or ""
-        folder = folders.get((unit, axis))
-        if folder is None:
-            raise InputError(
-                f"{run.name}: of unit '{unit}', axis '{axis}', of which {place} holds no model; state 'unit' "
-                "and 'axis' in its side file as the fleet's manifest does"
-            )
-        return load(place / str(folder) / "model")
-
-    return of_run
-
-
-def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.monitor_words import alarm_words, calibration_words, state_words, unit_label
-
-    rows = []
-    for unit in values["units"][:_SHOWN]:
-        last = unit["runs"][-1]
-        rows.append(
-            [
-                unit_label(unit),
-                str(len(unit["runs"])),
-                number(last["level"]),
-                number(unit["statistic"][-1]),
-                state_words(unit),
-            ]
-        )
-    terminal.table(
-        f"Units in service; alarm at {values['runs_between_false_alarms']:g}",
-        ["unit", "runs", "last level [deg/h]", "evidence", "state"],
-        rows,
-    )
-    for unit in values["units"][:_SHOWN]:
-        label = unit_label(unit)
-        calibration = "" if unit["alarms"] else calibration_words(unit)
-        for text in (*map(alarm_words, unit["alarms"]), calibration, *unit["notes"]):
-            if text:
-                terminal.say(f"{label}: {text}")
-    told = values["runs"]
-    terminal.say(f"{counted(told['added'], 'new run')} kept, {told['repeated']} there before")
