@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fogml.arrays import FloatArray
+from fogml.arrays import FloatArray, IndexArray
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.run import Run
@@ -36,8 +36,7 @@ def spiked(run: Run) -> Iterator[Finding]:
         found, _ = find_outliers(values)
         if bad is not None:
             found = found[~bad[found]]
-        near = np.clip(found[:, None] + np.array([-2, -1, 0, 1, 2]), 0, len(values) - 1)
-        off = np.abs(values[found] - np.median(values[near], axis=1))
+        off = _off(values, found)
         found, off = found[off >= LEAST_SPIKE_DEGC], off[off >= LEAST_SPIKE_DEGC]
         if len(found):
             row, count = int(found[0]), len(found)
@@ -48,6 +47,21 @@ def spiked(run: Run) -> Iterator[Finding]:
                 "count as temperature and as its rate"
             )
             yield Finding("temperature_outliers", message, column=name, row=row + 1, count=count)
+
+
+def _off(values: FloatArray, places: IndexArray) -> FloatArray:
+    """How far readings are off the median of five, and off lines through the two before and the two after.
+
+    The least of the three, so that a turn of the temperature, which goes on from one side, is none.
+    """
+    place = places[:, None] + np.array([-2, -1, 0, 1, 2])
+    near = values[np.clip(place, 0, len(values) - 1)]
+    own = near[:, 2]
+    before, after = 2.0 * near[:, 1] - near[:, 0], 2.0 * near[:, 3] - near[:, 4]
+    sides = np.abs(np.column_stack((own - before, own - after)))
+    sides[:, 0][places < 2] = np.inf
+    sides[:, 1][places > len(values) - 3] = np.inf
+    return np.minimum(np.abs(own - np.median(near, axis=1)), sides.min(axis=1))
 
 
 def coarse(run: Run) -> Iterator[Finding]:

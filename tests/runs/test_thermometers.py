@@ -38,6 +38,18 @@ def test_single_readings_that_stand_out_are_told(size):
     assert (found.code, found.column, found.row, found.count) == ("temperature_outliers", "T", 701, 2)
 
 
+def test_a_sharp_turn_of_a_temperature_is_no_reading_that_stands_out():
+    """As of electronics that are switched off and on, sampled slowly and without noise."""
+    time = 10.0 * np.arange(900.0)
+    turns = np.interp(time, [0.0, 3000.0, 3200.0, 3400.0, 9000.0], [25.0, 45.0, 25.0, 45.0, 46.0])
+    gyro = np.random.default_rng(0).normal(size=900)
+    assert told({"time": time, "gyro": gyro, "T": turns}) == []
+    turns[500] += 2.0
+    assert [(one.code, one.row) for one in told({"time": time, "gyro": gyro, "T": turns})] == [
+        ("temperature_outliers", 501)
+    ]
+
+
 @pytest.mark.parametrize("sample_s", [0.2, 1.0, 10.0])
 @pytest.mark.parametrize("digits", [1 / 1024, 1 / 16, 0.1, 0.25])
 def test_steps_that_leave_a_rate_as_it_is_are_not(sample_s, digits):
