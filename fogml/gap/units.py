@@ -155,14 +155,16 @@ class _Told:
     def __init__(self, found: Inference) -> None:
         self.found = found
         families = found.columns.families
-        least = found.setting.priors.least_size
+        least, own = found.setting.priors.least_size, found.search.names(found.explanations[0])
         # Within its range a cause may be too small to be seen here, whatever it is in other units.
-        known = (f for f in found.search.families_of("known") if found.field.shows(f, least))
+        known = (f for f in found.search.families_of("known") if f in own or found.field.shows(f, least))
         self.families = {families[f].id: f for f in known}
         self._scores: dict[frozenset[str], float] = {}
 
     def names(self, explanation: Explanation) -> frozenset[str]:
-        return frozenset(self.found.columns.families[f].id for f in self.found.search.names(explanation))
+        """Those among a set that these runs can show."""
+        named = (self.found.columns.families[f].id for f in self.found.search.names(explanation))
+        return frozenset(self.families).intersection(named)
 
     @property
     def sets(self) -> set[frozenset[str]]:
