@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import combinations
 
@@ -21,14 +21,14 @@ from fogml.twin.registry import effect
 from fogml.twin.twin import Twin
 
 
-def signature_of(declared: Effect) -> Build:
+def signature_of(declared: Effect, only: Sequence[GridNode] | None = None) -> Build:
     """The family of an effect that declares no other: its own signature over a grid of its shapes.
 
-    Driven by each temperature that may be the one of its place.
+    Driven by each temperature that may be the one of its place; over some nodes of the grid where given.
     """
 
     def build(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-        nodes = nodes_of(declared, scene, constants)
+        nodes = nodes_of(declared, scene, constants) if only is None else only
         positive = not declared.amplitude.signed and declared.amplitude.limits[0] >= 0.0
         for name, driving, weight in _driving(declared, rows, scene):
             for node in nodes:

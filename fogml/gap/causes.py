@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from fogml.gap.result_parts import Onset
 from fogml.gap.rows import Rows
 from fogml.gap.scene import Scene
 from fogml.gap.settings import Reported
-from fogml.gap.shapes import AT_AMPLITUDE, is_angle
+from fogml.gap.shapes import AT_AMPLITUDE, GridNode, is_angle, is_line
 from fogml.runs.steps import FINEST_STEP_DEGC, WHOLE, recorded_step
 from fogml.signals.distributions import chi2_sf
 from fogml.twin.effect import Effect
@@ -77,8 +78,9 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
     }
     if declared.drawn_per_run or declared.family in ("line", "power_cycles"):
         return _drawn(declared, shape, field, beside)
-    nodes, build = nodes_of(declared, scene, setting.values), signature_of(declared)
     most = setting.priors.reported.card_nodes
+    nodes = _near_lines(declared, nodes_of(declared, scene, setting.values), lines)[:most]
+    build = signature_of(declared, nodes)
     by_run = [[b.columns for b in islice(build(r, scene, setting.values), most)] for r in scene.fit]
     stacked = field.whitening.stacked([np.concatenate(columns, axis=1) for columns in by_run])
     told_by = []
@@ -124,6 +126,16 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
         amplitude, se = _step(scene.fit, amplitude, se)
     amplitude = float(np.clip(amplitude, *declared.amplitude.limits))
     return Card(EffectValue(id, amplitude, shape), se, shape_se)
+
+
+def _near_lines(declared: Effect, nodes: Sequence[GridNode], lines: Mapping[str, Any]) -> Sequence[GridNode]:
+    """Nodes by how near their period or frequency is to the one that a family tells, if it tells one."""
+    for quantity in filter(is_line, declared.shape):
+        kind = "period" if "period" in quantity.name else "frequency"
+        told = lines.get(quantity.name, lines.get(kind))
+        if isinstance(told, float) and told > 0.0:
+            return sorted(nodes, key=lambda node: abs(math.log(node.shape[quantity.name] / told)))
+    return nodes
 
 
 def _step(runs: Sequence[Rows], amplitude: float, se: float) -> tuple[float, float]:
