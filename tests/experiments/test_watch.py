@@ -10,8 +10,8 @@ import pytest
 
 from experiments import watch
 from experiments.watch.__main__ import page, recorded, with_release, worse
-from experiments.watch.counting import calls, modules_loaded, peak_bytes
-from experiments.watch.figures import WATCHED, measured
+from experiments.watch.counting import calls, in_own_process, modules_loaded, peak_bytes
+from experiments.watch.figures import WATCHED
 from fogml import __version__
 from fogml.signals.averages import block_averages
 
@@ -21,7 +21,7 @@ HERE = Path(watch.__file__).parent
 def test_nothing_has_become_half_as_much_again() -> None:
     rows = recorded()
     assert set(rows[-1]["figures"]) == set(WATCHED), "a figure is new or gone: python -m experiments.watch"
-    assert not worse(measured(), rows[-1]["figures"])
+    assert not worse(in_own_process("experiments.watch.figures.measured()"), rows[-1]["figures"])
 
 
 def test_the_release_in_force_is_recorded_and_the_page_is_of_the_rows() -> None:
@@ -47,9 +47,14 @@ def test_a_loop_over_rows_shows_in_calls_and_a_copy_in_memory() -> None:
     many = calls(lambda: [block_averages(time, values, window_s=10.0) for _ in range(50)])
     assert once > 0 and many == 50 * once
     assert calls(lambda: [len(str(i)) for i in range(1000)]) == 0  # not fogml's
-    assert peak_bytes(lambda: np.ones(100_000)) == pytest.approx(800_000, rel=0.01)
-    assert peak_bytes(lambda: np.ones(100_000) + np.ones(100_000)) >= 1_590_000
+    one, two = in_own_process("tests.experiments.test_watch.peaks()")
+    assert one == pytest.approx(800_000, rel=0.01) and two >= 1_590_000
     assert modules_loaded("import decimal") > 0 == modules_loaded("import sys")
+
+
+def peaks() -> tuple[int, int]:
+    """Of one array of 800 kB, and of two whose sum is a third."""
+    return peak_bytes(lambda: np.ones(100_000)), peak_bytes(lambda: np.ones(100_000) + np.ones(100_000))
 
 
 def test_a_row_takes_the_place_of_its_release() -> None:
