@@ -8,7 +8,7 @@ from typing import Any
 
 from fogml.cli.fleet_unit import UnitWork
 from fogml.cli.run_commands import FleetSettings
-from fogml.cli.terminal import Terminal, Work, number
+from fogml.cli.terminal import UNITS_SHOWN, Terminal, Work, number
 from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
@@ -43,9 +43,6 @@ def write_batch(batch: Mapping[str, Any], folder: Path, name: str) -> None:
     write_json(folder / "batch.json", batch)
     (folder / "batch.html").write_text(batch_page(batch, name), encoding="utf-8")
     batch_spreadsheet(batch, folder / "batch.xlsx")
-
-
-_SHOWN = 40
 
 
 def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
@@ -170,7 +167,7 @@ def _track(tracker: Tracker, outcome: dict[str, Any]) -> None:
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
     rows = []
-    for unit in values["units"][:_SHOWN]:
+    for unit in values["units"][:UNITS_SHOWN]:
         label = f"{unit['unit']} {unit['axis']}".strip()
         told = unit["verdict"].replace("_", " ") or unit["model"] or unit["reason"]
         figures = [number(unit[key]) for key in ("before", "after", "floor")]
@@ -180,8 +177,8 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     over = f", {times.pop():g} s averages" if len(times) == 1 else ""
     terminal.table(f"Worst test run of each unit [deg/h]{over}", heads, rows)
     for key, what in (("outliers", "Unlike the others"), ("again", "Needs another run")):
-        for item in values[key][:_SHOWN]:
+        for item in values[key][:UNITS_SHOWN]:
             terminal.say(f"{what}: {item['unit']}: {item['why']}")
     most = max(len(values[key]) for key in ("units", "outliers", "again"))
-    if most > _SHOWN:
-        terminal.say(f"The first {_SHOWN} of each are shown; fleet.html and fleet.xlsx hold all.")
+    if most > UNITS_SHOWN:
+        terminal.say(f"The first {UNITS_SHOWN} of each are shown; fleet.html and fleet.xlsx hold all.")

@@ -11,7 +11,7 @@ from typing import Any
 
 from fogml.cli.run_commands import MonitorSettings
 from fogml.cli.runs import check_named_once, note_wrong, open_blocks
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import UNITS_SHOWN, Terminal, number
 from fogml.errors import InputError, counted
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.models.base import DriftModel
@@ -24,7 +24,6 @@ from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 
 FLEET = "fleet.json"
-_SHOWN = 40
 
 
 def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
@@ -137,7 +136,7 @@ def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
     from fogml.report.monitor_words import alarm_words, calibration_words, state_words, unit_label
 
     rows = []
-    for unit in values["units"][:_SHOWN]:
+    for unit in values["units"][:UNITS_SHOWN]:
         last = unit["runs"][-1]
         rows.append(
             [
@@ -153,7 +152,7 @@ def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
         ["unit", "runs", "last level [deg/h]", "evidence", "state"],
         rows,
     )
-    for unit in values["units"][:_SHOWN]:
+    for unit in values["units"][:UNITS_SHOWN]:
         label = unit_label(unit)
         calibration = "" if unit["alarms"] else calibration_words(unit)
         for text in (*map(alarm_words, unit["alarms"]), calibration, *unit["notes"]):

@@ -250,6 +250,10 @@ def _bar(what: str, total: float | None) -> Iterator[Work]:
         yield Bar()
 
 
+UNITS_SHOWN = 40
+"""Units that a table on the terminal holds; pages and files hold all."""
+
+
 def number(value: float | None) -> str:
     """A figure for a table: four significant digits; a dash where there is none.
 

@@ -99,11 +99,13 @@ def card_of(id: str, field: Field, beside: LinearGaussian, lines: Mapping[str, f
         back = np.where(np.isfinite(scale), 1.0, 0.0)[:, None] * np.linalg.inv(node.mix)
         told_by.append((0.5 * float(fits @ coefficients), node, coefficients, back.T @ gram @ back))
     found: list[tuple[float, NodeValue]] = []
+    most_gained = -math.inf
     for gain, node, coefficients, information in sorted(told_by, key=lambda told: -told[0]):
-        if found and gain < max(gain for gain, _ in found) - setting.priors.hopeless:
+        if gain < most_gained - setting.priors.hopeless:
             break
         value = node_value(declared, node, node.mix @ coefficients, information)
         found.append((gain - 0.5 * value.misfit - value.count, value))
+        most_gained = max(most_gained, found[-1][0])
     gains = np.array([gain for gain, _ in found])
     best = found[int(np.argmax(gains))][1]
     weights = np.exp(gains - gains.max())

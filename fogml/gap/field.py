@@ -117,7 +117,8 @@ class Field:
         whole, kept = (np.add.reduceat(v, edges[:-1]) if picked else v for v in (whole, kept))
         shown = kept > np.maximum(setting.priors.noise.in_constants * whole, 1e-18)
         # What would stay below a standard deviation at the greatest size that there is can't be seen.
-        shown &= kept >= np.array([self._largest(columns.nodes[i].family) for i in picked]) ** -2.0
+        largest = np.array([self._largest(f) for f in range(len(columns.families))])
+        shown &= kept >= largest[np.array([columns.nodes[i].family for i in picked], dtype=np.intp)] ** -2.0
         scales = np.where(shown, 1.0 / np.sqrt(np.where(shown, kept, 1.0)), 0.0)
         self.white *= np.repeat(scales, np.diff(edges))
         self.scale = {i: float(s) for i, s in zip(picked, scales) if s}
@@ -272,7 +273,8 @@ class Blocks:
 
 def _range_penalties(held: Field, nodes: list[int], lengths: FloatArray) -> FloatArray:
     """Logarithm of how likely each node's sizes are by the card's or family's range, shape (nodes, sizes)."""
-    highest = np.array([held.usual_most(held.columns.nodes[n].family) for n in nodes])
+    by_family = np.array([held.usual_most(f) for f in range(len(held.columns.families))])
+    highest = by_family[[held.columns.nodes[n].family for n in nodes]]
     scales = np.array([held.scale[n] for n in nodes])
     over = np.log(np.maximum(scales[:, None] * lengths / highest[:, None], 1.0))
     return np.asarray(-0.5 * (over / math.log(held.setting.priors.beyond_range)) ** 2)
