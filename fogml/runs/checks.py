@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
-from fogml.errors import InputError
+from fogml.errors import InputError, counted
 from fogml.runs.findings import DEAD, Finding, dead_words
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
@@ -107,7 +107,7 @@ def _dropouts(run: Run) -> Iterator[Finding]:
         bad = run.dropouts(name)
         if bad is not None:
             count, row = int(np.count_nonzero(bad)), int(np.argmax(bad))
-            readings = "1 reading" if count == 1 else f"{count} readings"
+            readings = counted(count, "reading")
             message = (
                 f"{readings} of '{name}' {'is' if count == 1 else 'are'} none, the first "
                 f"{run.columns[name][row]:.6g} at {run.time[row]:.10g} s: out of range, or a jump that no "
@@ -121,7 +121,7 @@ def _gaps(run: Run) -> Iterator[Finding]:
     if len(starts):
         lengths = run.time[starts] - run.time[starts - 1]
         longest = int(np.argmax(lengths))
-        gaps = "1 gap" if len(starts) == 1 else f"{len(starts)} gaps"
+        gaps = counted(len(starts), "gap")
         message = (
             f"{gaps} longer than 3 sample intervals, the longest {lengths[longest]:.4g} s at "
             f"{run.time[starts[longest] - 1]:.10g} s; the run is cut into {len(starts) + 1} stretches"
@@ -295,7 +295,7 @@ def _outliers(run: Run) -> Iterator[Finding]:
     found, sigma = find_outliers(run.gyro, run.columns.get("rate"))
     if len(found):
         row = int(found[0])
-        samples = "1 sample" if len(found) == 1 else f"{len(found)} samples"
+        samples = counted(len(found), "sample")
         message = (
             f"{samples} of 'gyro' over {OUTLIER_SIGMA:g} robust sigma ({sigma[0]:.4g}) off their "
             f"neighbours, the first {run.gyro[row]:.6g} at {run.time[row]:.10g} s; kept"

@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, counted, quoted
 from fogml.runs.csv_dialect import CsvDialect
 from fogml.runs.csv_header import fields_of
 from fogml.runs.csv_numbers import number
@@ -47,7 +47,7 @@ def without_footer(dialect: CsvDialect) -> tuple[CsvDialect, list[Finding]]:
     # An odd mark closes a quoted field of several lines, which belongs to the sample above.
     if not below or "".join(below).count('"') % 2:
         return dialect, []
-    count = "1 line" if len(told) == 1 else f"{len(told)} lines"
+    count = counted(len(told), "line")
     message = f"{count} below the last sample left out: {quoted(told[0])}" if told else ""
     source = dialect.source.without("".join(below), dialect.encoding.removesuffix("-sig"))
     return replace(dialect, source=source), [Finding("footer", message, count=len(told))] if told else []

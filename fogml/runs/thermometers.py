@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.errors import counted
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.run import Run
@@ -40,7 +41,7 @@ def spiked(run: Run) -> Iterator[Finding]:
         found, off = found[off >= LEAST_SPIKE_DEGC], off[off >= LEAST_SPIKE_DEGC]
         if len(found):
             row, count = int(found[0]), len(found)
-            readings = "1 reading" if count == 1 else f"{count} readings"
+            readings = counted(count, "reading")
             message = (
                 f"{readings} of '{name}' over {OUTLIER_SIGMA:g} robust sigma off their neighbours, by up to "
                 f"{off.max():.3g} degC, the first {values[row]:.6g} at {run.time[row]:.10g} s; kept: they "

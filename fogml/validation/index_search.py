@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
-from fogml.errors import FogmlError, InputError
+from fogml.errors import FogmlError, InputError, counted
 from fogml.models.table import usable_rows
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S, block_averages
@@ -106,7 +106,7 @@ class IndexSearch:
             if self.met
             else f"none meets the design index there, {self.chosen.candidate.name} comes nearest"
         )
-        tries = "1 try" if len(self.trials) == 1 else f"{len(self.trials)} tries"
+        tries = counted(len(self.trials), "try", "tries")
         return (
             f"Searched on folds of the training runs in {tries}: {outcome} "
             f"({self.chosen.rms:.4g} deg/h against {self.design_index:g}). The test runs were judged once."
