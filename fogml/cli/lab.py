@@ -147,7 +147,7 @@ class NorthSettings(Settings):
     method: Annotated[
         str,
         option(
-            "With --positions: auto, plain, drift-observing.",
+            "With --positions: auto, plain, drift-observing, bend-observing.",
             metavar="NAME",
             known="fogml.lab.north_positions:METHODS",
         ),

@@ -45,6 +45,7 @@ def recorded_north_json(
         run, sense=sense, order_deg=order_deg, method=method, settle_s=settle_s, latitude_deg=latitude_deg
     )
     error = fix.error
+    off_from = fix.bent_deg if fix.method == "bend-observing" else fix.observed_deg
     return {
         "schema": SCHEMA,
         "kind": "recorded",
@@ -54,12 +55,15 @@ def recorded_north_json(
         "drift_deg_h_per_h": fix.drift_deg_h_h,
         "quiet_azimuth_deg": list(error.quiet_deg),
         "worst_azimuth_deg": list(error.worst_deg),
-        "error_deg": None if fix.observed_deg is None else float(wrapped(fix.plain_deg - fix.observed_deg)),
+        "error_deg": None if off_from is None else float(wrapped(fix.plain_deg - off_from)),
         "se": fix.se_deg,
         "drift_se": fix.drift_se,
+        "bend_deg_h_per_h2": fix.bend_deg_h_h2,
+        "bend_se": fix.bend_se,
         "method": fix.method,
         "plain_azimuth_deg": fix.plain_deg,
         "drift_observing_azimuth_deg": fix.observed_deg,
+        "bend_observing_azimuth_deg": fix.bent_deg,
         "greatest_error_deg": error.greatest if fix.method != "plain" else None,
         "horizontal_deg_h": fix.horizontal_deg_h,
         "offset_deg_h": fix.offset_deg_h,

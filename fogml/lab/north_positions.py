@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,63 +11,18 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError, known_are
 from fogml.lab.north import (
     DEFAULT_ORDER,
+    SENSES,
     DriftError,
     check_design,
     design_matrix,
-    horizontal_rate,
 )
+from fogml.lab.north_fix import NorthFix, angle_notes, azimuth_se, fix_notes, set_up_notes
 from fogml.models.linear import LinearRegressor
 from fogml.models.row_noise import MEANS_A_STAY, noise_covariance
 from fogml.models.table import RunRows
 from fogml.runs.run import Run
 
-METHODS = ("auto", "plain", "drift-observing")
-
-
-@dataclass(frozen=True)
-class NorthFix:
-    """An azimuth from recorded positions.
-
-    Attributes
-    ----------
-    azimuth_deg, se_deg
-        Azimuth clockwise from north of the input axis in the first angle's position, and its standard
-        error under the gyro's own noise [deg]; None where the samples are too few to tell that.
-    method
-        ``plain`` or ``drift-observing``.
-    plain_deg, observed_deg
-        Both results [deg]; the second None where the positions do not tell a drift.
-    drift_deg_h_h, drift_se
-        Linear drift seen [deg/h per h] and its standard error; None where they do not tell it.
-    horizontal_deg_h
-        Horizontal Earth rate that the positions show [deg/h].
-    offset_deg_h
-        Bias [deg/h].
-    error
-        What the drift that was seen, or a small one where none was, does to the plain result.
-    means_deg_h, times_s, positions
-        Each stay's mean, middle time and position, each of shape (m,).
-    noise_deg_h
-        Standard deviation of one sample within the stays; None where there is one sample only.
-    notes
-        What to mind.
-    """
-
-    azimuth_deg: float
-    se_deg: float | None
-    method: str
-    plain_deg: float
-    observed_deg: float | None
-    drift_deg_h_h: float | None
-    drift_se: float | None
-    horizontal_deg_h: float
-    offset_deg_h: float
-    error: DriftError
-    means_deg_h: FloatArray
-    times_s: FloatArray
-    positions: FloatArray
-    noise_deg_h: float | None
-    notes: tuple[str, ...] = ()
+METHODS = ("auto", "plain", "drift-observing", "bend-observing")
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +61,9 @@ def north_from_positions(
     order_deg
         Angle of position 1, 2, ... [deg].
     method
-        ``plain``, ``drift-observing``, or ``auto``: the second where the positions tell a linear drift. A
-        drift of the bias too small to show is a multiple of the plain result's standard error.
+        ``plain``, ``drift-observing``, ``bend-observing``, or ``auto``: the second where the positions tell
+        a linear drift. A drift too small to show may be a multiple of the plain result's standard error. The
+        third takes out a square of time as well, as at start-up, at up to twice the standard error.
     settle_s
         Time left out at the begin of each stay [s].
     latitude_deg
@@ -126,30 +82,35 @@ def north_from_positions(
     angles = np.asarray(order_deg, dtype=np.float64)[stays.positions.astype(int) - 1]
     plain_design = design_matrix(angles, sense, None)
     check_design(plain_design, False)
-    try:
-        check_design(design_matrix(angles, sense, stays.times), True)
-    except InputError:
-        if method == "drift-observing":
-            raise
-        wide = None
+    if _tells_drift(angles, sense, stays, method):
+        fits = [_fitted(stays, plain_design, order) for order in (0, 1, 2)]
     else:
-        wide = _fitted(stays, plain_design, True)
-    plain = _fitted(stays, plain_design, False)
-    observed = wide is not None and method != "plain"
-    chosen, covariance = wide if wide is not None and observed else plain
-    drift = None if wide is None else float(wide[0][3])
+        fits = [_fitted(stays, plain_design, 0)]
+    if len(fits) > 2 and not _tells_bend(stays, plain_design):
+        fits.pop()
+    order = {"plain": 0, "drift-observing": 1, "bend-observing": 2, "auto": min(len(fits) - 1, 1)}[method]
+    if order >= len(fits):
+        raise InputError(f"{run.name}: the samples in each position are too few to tell a bend of the bias")
+    chosen, covariance = fits[order]
+    drift, drift_se = _term(fits[max(order, 1)], 3) if len(fits) > 1 else (None, None)
+    bend, bend_se = _term(fits[2], 4) if len(fits) > 2 else (None, None)
     horizontal = float(np.hypot(chosen[0], chosen[1]))
-    # What a drift of 1 deg/h per h does to the plain result.
-    hours = _solved(stays, plain_design, (stays.time - stays.time.mean()) / 3600.0, False)
-    p = hours.coef_[:2] * (drift if observed and drift else 1e-9)
-    return NorthFix(
-        azimuth_deg=_azimuth(chosen),
-        se_deg=_azimuth_se(chosen, covariance),
-        method="drift-observing" if observed else "plain",
-        plain_deg=_azimuth(plain[0]),
-        observed_deg=None if wide is None else _azimuth(wide[0]),
+    # What a drift of 1 deg/h per h does to the plain result, where none is taken out.
+    hours = (stays.time - stays.time.mean()) / 3600.0
+    taken = np.polynomial.polynomial.polyval(hours, np.concatenate(([0.0], chosen[3:])))
+    p = _solved(stays, plain_design, taken if np.any(taken) else 1e-9 * hours, 0).coef_
+    found = [_azimuth(fit[0]) for fit in fits]
+    fix = NorthFix(
+        azimuth_deg=found[order],
+        se_deg=azimuth_se(chosen, covariance),
+        method=METHODS[1 + order],
+        plain_deg=found[0],
+        observed_deg=found[1] if len(found) > 1 else None,
+        bent_deg=found[2] if len(found) > 2 else None,
         drift_deg_h_h=drift,
-        drift_se=None if wide is None or wide[1] is None else float(np.sqrt(wide[1][3, 3])),
+        drift_se=drift_se,
+        bend_deg_h_h2=bend,
+        bend_se=bend_se,
         horizontal_deg_h=horizontal,
         offset_deg_h=float(chosen[2]),
         error=DriftError(float(p[0]), float(p[1]), horizontal),
@@ -157,8 +118,34 @@ def north_from_positions(
         times_s=stays.times,
         positions=stays.positions,
         noise_deg_h=_sample_noise(stays),
-        notes=_notes(run, latitude_deg, horizontal, covariance, drift),
     )
+    notes = [
+        *fix_notes(fix, covariance, azimuth_se(*fits[2]) if len(fits) > 2 else None),
+        *set_up_notes(run, fix, covariance, latitude_deg),
+        *angle_notes(run, stays.times, angles * SENSES[sense], angle_tolerance_deg),
+    ]
+    return replace(fix, notes=tuple(notes))
+
+
+def _tells_drift(angles: FloatArray, sense: str, stays: _Stays, method: str) -> bool:
+    try:
+        check_design(design_matrix(angles, sense, stays.times), True)
+    except InputError:
+        if method in METHODS[2:]:
+            raise
+        return False
+    return True
+
+
+def _tells_bend(stays: _Stays, design: FloatArray) -> bool:
+    columns = _columns(stays, design, 2)
+    columns = np.column_stack((np.ones(len(columns)), columns / np.linalg.norm(columns, axis=0)))
+    return bool(np.linalg.matrix_rank(columns, tol=1e-6) == columns.shape[1])
+
+
+def _term(fit: tuple[FloatArray, FloatArray | None], place: int) -> tuple[float, float | None]:
+    found, covariance = fit
+    return float(found[place]), None if covariance is None else float(np.sqrt(covariance[place, place]))
 
 
 def _recorded_positions(run: Run, order_deg: Sequence[float], sense: str, tolerance_deg: float) -> FloatArray:
@@ -230,75 +217,34 @@ def _sample_noise(stays: _Stays) -> float | None:
     return float(np.sqrt(residuals @ residuals / freedom))
 
 
-def _columns(stays: _Stays, design: FloatArray, observes_drift: bool) -> FloatArray:
-    """Columns of every sample beside the constant: H cos(theta), H sin(theta) and, if observed, drift."""
-    turned = design[stays.stay, :2]
-    return np.column_stack((turned, (stays.time - stays.time.mean()) / 3600.0)) if observes_drift else turned
+def _columns(stays: _Stays, design: FloatArray, order: int) -> FloatArray:
+    """Columns of every sample beside the constant: H cos(theta), H sin(theta), powers of time up to one."""
+    hours = (stays.time - stays.time.mean()) / 3600.0
+    return np.column_stack([design[stays.stay, :2], *(hours**power for power in range(1, order + 1))])
 
 
-def _solved(stays: _Stays, design: FloatArray, values: FloatArray, observes_drift: bool) -> LinearRegressor:
-    return LinearRegressor().fit(_columns(stays, design, observes_drift), values)
+def _solved(stays: _Stays, design: FloatArray, values: FloatArray, order: int) -> LinearRegressor:
+    return LinearRegressor().fit(_columns(stays, design, order), values)
 
 
-def _fitted(stays: _Stays, design: FloatArray, observes_drift: bool) -> tuple[FloatArray, FloatArray | None]:
-    """H cos(theta), H sin(theta), offset and, if observed, drift; their covariance under the gyro's noise.
+def _fitted(stays: _Stays, design: FloatArray, order: int) -> tuple[FloatArray, FloatArray | None]:
+    """H cos(theta), H sin(theta), offset, powers of time up to an order; their covariance under the noise.
 
     None for that where the stays are too short to tell a noise, which is not taken for white: the mean of a
     quiet gyro over a stay is as uncertain as its flicker makes it.
     """
     level = float(stays.gyro.mean())
-    solved = _solved(stays, design, stays.gyro - level, observes_drift)
-    rows = RunRows(_columns(stays, design, observes_drift), stays.gyro - level, stays.time)
+    solved = _solved(stays, design, stays.gyro - level, order)
+    rows = RunRows(_columns(stays, design, order), stays.gyro - level, stays.time)
     step_s = float(np.median(np.diff(stays.time))) if len(stays.time) > 1 else 0.0
     averaging_s = float(np.median(stays.lengths_s)) / MEANS_A_STAY
     covariance = noise_covariance(
         [rows], lambda columns: columns, solved, averaging_s if averaging_s > step_s else 0.0
     )
-    order = [1, 2, 0, 3] if observes_drift else [1, 2, 0]
-    found = np.concatenate(([solved.intercept_ + level], solved.coef_))[order]
-    return found, None if covariance is None else covariance[np.ix_(order, order)]
+    place = [1, 2, 0, *range(3, 3 + order)]
+    found = np.concatenate(([solved.intercept_ + level], solved.coef_))[place]
+    return found, None if covariance is None else covariance[np.ix_(place, place)]
 
 
 def _azimuth(found: FloatArray) -> float:
     return float(np.degrees(np.arctan2(found[1], found[0])) % 360.0)
-
-
-def _azimuth_se(found: FloatArray, covariance: FloatArray | None) -> float | None:
-    if covariance is None:
-        return None
-    square = float(found[0] ** 2 + found[1] ** 2)
-    slope = np.array([-found[1], found[0]]) / square
-    return float(np.degrees(np.sqrt(slope @ covariance[:2, :2] @ slope)))
-
-
-def _notes(
-    run: Run,
-    latitude_deg: float | None,
-    horizontal: float,
-    covariance: FloatArray | None,
-    drift: float | None,
-) -> tuple[str, ...]:
-    latitude = run.facts.latitude if latitude_deg is None else latitude_deg
-    told = (
-        []
-        if drift is not None
-        else ["the positions don't tell a drift: the standard error holds without one"]
-    )
-    if covariance is None:
-        told.append("no standard error: the samples in each position are too few, or hold no noise")
-    if latitude is None:
-        told.append(
-            f"no latitude is stated: the horizontal Earth rate is the one seen, {horizontal:.4g} deg/h"
-        )
-        return tuple(told)
-    expected = horizontal_rate(latitude)
-    tolerance = 0.02 * expected + (
-        5.0 * float(np.sqrt(covariance[:2, :2].trace())) if covariance is not None else 0.0
-    )
-    if abs(horizontal - expected) > tolerance:
-        told.append(
-            f"the positions show {horizontal:.4g} deg/h of Earth rate, {expected:.4g} deg/h were expected "
-            f"at latitude {latitude:g} deg: the axis is not level, the scale factor is off, or the positions "
-            "are not what they are called"
-        )
-    return tuple(told)

@@ -41,17 +41,19 @@ def _recorded_verdict(values: Mapping[str, Any]) -> list[str]:
     within = f" ± {number(values['se'], 2)}" if values["se"] is not None else ""
     sentences = [f"The azimuth is {values['azimuth_deg']:.4f}{within} deg."]
     drift = values["drift_deg_h_per_h"]
-    if values["method"] == "drift-observing":
+    if values["method"] != "plain":
+        bent = ", and its bend," if values["method"] == "bend-observing" else ""
         sentences.append(
             f"A linear drift of {number(drift)} ± {number(values['drift_se'], 2)} deg/h "
-            f"per h is taken out; a plain seek is {number(values['error_deg'])} deg from this one."
+            f"per h{bent} is taken out; a plain seek is {number(values['error_deg'])} deg from this one."
         )
     elif drift is not None:
         sentences.append("The standard error of a plain seek holds only where the bias does not drift.")
     if values["se"] is not None:
+        bends = "" if values["method"] == "bend-observing" else "a bias that bends, as at start-up, and "
         sentences.append(
             "The standard error is of the gyro's noise, flicker and random walk as the stays tell them; it "
-            "does not hold a bias that bends, as at start-up, and errors of the table's angles and level."
+            f"does not hold {bends}errors of the table's angles and level."
         )
     return sentences
 

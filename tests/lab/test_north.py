@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -19,6 +21,8 @@ from fogml.lab.north_schemes import (
     ways_of_equal_time,
     wrapped,
 )
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
 
 LINEAR = Drift(0.18)
 START_UP = Drift(0.05, ((0.2, 600.0), (-0.1, 90.0)))
@@ -232,3 +236,55 @@ def test_a_drift_without_any_earth_rate_is_worst_where_it_points() -> None:
     found = DriftError(1.0, 0.0, 0.0)
     assert found.greatest == 180.0 and found.worst_deg == (180.0, 180.0)
     assert found.worst_deg == pytest.approx(DriftError(1.0, 0.0, 1e-9).worst_deg)
+
+
+def own_seek(
+    seed: int, azimuth: float, latitude: float, *, walk: float, drift: Callable[[np.ndarray], np.ndarray]
+) -> Run:
+    """Four stays of 60 s at 10 Hz, clockwise, 10 s from one to the next, in plain NumPy."""
+    time = np.arange(2700) / 10.0
+    place, into = np.divmod(time, 70.0)
+    rate = 15.041067 * np.cos(np.radians(latitude)) * np.cos(np.radians(azimuth + 90.0 * place))
+    noise = walk * 60.0 / np.sqrt(0.1) * np.random.default_rng(seed).standard_normal(len(time))
+    position = np.where(into < 60.0, place + 1.0, 0.0)
+    columns = {"time": time, "gyro": rate + 0.7 + drift(time) + noise, "position": position}
+    columns["angle"] = -90.0 * (place + np.clip((into - 60.0) / 10.0, 0.0, 1.0))
+    return Run("own", columns, Facts(latitude=latitude))
+
+
+@pytest.mark.parametrize("latitude", [89.6, -89.85])
+def test_near_a_pole_an_azimuth_that_is_noise_says_so(latitude: float) -> None:
+    azimuths, inside, told = np.linspace(0.0, 340.0, 30), 0, 0
+    for seed, azimuth in enumerate(azimuths):
+        fix = north_from_positions(own_seek(seed, azimuth, latitude, walk=0.01, drift=np.zeros_like))
+        assert fix.se_deg is not None
+        inside += abs(float(wrapped(fix.azimuth_deg - azimuth))) <= 1.645 * fix.se_deg
+        told += "don't tell north" in " ".join(fix.notes)
+    assert inside >= 24 and told >= 10
+
+
+def test_a_bias_that_bends_is_noticed_and_can_be_taken_out() -> None:
+    scores, told = {"auto": [], "bend-observing": []}, 0
+    for seed in range(30):
+        azimuth = 12.0 * seed
+        run = own_seek(seed, azimuth, 40.0, walk=0.001, drift=lambda t: 1.5 * np.exp(-t / 100.0))
+        for method, found in scores.items():
+            fix = north_from_positions(run, method=method)
+            assert fix.se_deg is not None and fix.method == ("drift-observing", method)[method != "auto"]
+            found.append(float(wrapped(fix.azimuth_deg - azimuth)) / fix.se_deg)
+            told += method == "auto" and "bends" in " ".join(fix.notes)
+    assert told >= 25 and np.std(scores["auto"]) > 2.0 and np.std(scores["bend-observing"]) < 1.5
+    straight = [
+        north_from_positions(own_seek(s, 77.0, 40.0, walk=0.001, drift=np.zeros_like)) for s in range(20)
+    ]
+    assert not any(fix.notes for fix in straight)
+
+
+def test_a_set_up_that_the_run_contradicts_is_noted() -> None:
+    run = own_seek(1, 77.0, 40.0, walk=0.001, drift=np.zeros_like)
+    assert north_from_positions(run).notes == ()
+    assert "the other --sense" in north_from_positions(run, sense="ccw").notes[-1]
+    order = (0.0, 180.0, 90.0, 270.0)
+    assert "--order" in north_from_positions(run, order_deg=order).notes[-1]
+    up = Run(run.name, dict(run.columns), Facts(latitude=40.0, input_axis="up"))
+    assert "points up" in " ".join(north_from_positions(up).notes)

@@ -1,0 +1,188 @@
+"""An azimuth from recorded positions: what is told of it, its standard error, what to mind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.arrays import FloatArray
+from fogml.lab.north import DriftError, horizontal_rate
+from fogml.runs.run import Run
+
+ANY_DEG = 180.0 / float(np.sqrt(3.0))
+"""Root mean square error of an azimuth that may be any."""
+_NODES = 40
+"""Nodes a side of the Gauss-Hermite rule over the plane of cosine and sine."""
+_NO_NORTH = 5.99
+"""Square of a normalised distance that two normal numbers exceed once in 20: chi-square of 2."""
+_BEND_SHOWS = 2.58
+"""Standard errors that a normal number exceeds once in 100."""
+_LAST_DIGIT_DEG = 1e-5
+"""Of an azimuth as it is printed; what moves it by less is nothing."""
+
+
+@dataclass(frozen=True)
+class NorthFix:
+    """An azimuth from recorded positions.
+
+    Attributes
+    ----------
+    azimuth_deg, se_deg
+        Azimuth clockwise from north of the input axis in the first angle's position, and its standard
+        error under the gyro's own noise [deg]; None where the samples are too few to tell that.
+    method
+        ``plain``, ``drift-observing`` or ``bend-observing``.
+    plain_deg, observed_deg, bent_deg
+        Results with a constant bias, one that drifts and one that bends [deg]; None where the positions do
+        not tell the drift or the bend.
+    drift_deg_h_h, drift_se
+        Linear drift seen [deg/h per h] and its standard error; None where they do not tell it.
+    bend_deg_h_h2, bend_se
+        Coefficient of the time squared [deg/h per h^2] and its standard error, the same.
+    horizontal_deg_h
+        Horizontal Earth rate that the positions show [deg/h].
+    offset_deg_h
+        Bias [deg/h].
+    error
+        What the drift that was seen, or a small one where none was, does to the plain result.
+    means_deg_h, times_s, positions
+        Each stay's mean, middle time and position, each of shape (m,).
+    noise_deg_h
+        Standard deviation of one sample within the stays; None where there is one sample only.
+    notes
+        What to mind.
+    """
+
+    azimuth_deg: float
+    se_deg: float | None
+    method: str
+    plain_deg: float
+    observed_deg: float | None
+    bent_deg: float | None
+    drift_deg_h_h: float | None
+    drift_se: float | None
+    bend_deg_h_h2: float | None
+    bend_se: float | None
+    horizontal_deg_h: float
+    offset_deg_h: float
+    error: DriftError
+    means_deg_h: FloatArray
+    times_s: FloatArray
+    positions: FloatArray
+    noise_deg_h: float | None
+    notes: tuple[str, ...] = ()
+
+
+def azimuth_se(found: FloatArray, covariance: FloatArray | None) -> float | None:
+    """Root mean square of the azimuth's error on the circle [deg]; `ANY_DEG` where no Earth rate shows.
+
+    Parameters
+    ----------
+    found
+        H cos(theta) and H sin(theta) first [deg/h].
+    covariance
+        Of ``found``.
+    """
+    if covariance is None:
+        return None
+    if float(found[:2] @ np.linalg.pinv(covariance[:2, :2]) @ found[:2]) < _NO_NORTH:
+        return ANY_DEG
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+    weights = weights / weights.sum()
+    values, vectors = np.linalg.eigh(covariance[:2, :2])
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    c, s = found[:2, None, None] + np.einsum("ij,jab->iab", root, np.array(np.meshgrid(nodes, nodes)))
+    off = np.angle((c + 1j * s) * complex(found[0], -found[1]))
+    return float(np.degrees(np.sqrt(weights @ off**2 @ weights)))
+
+
+def fix_notes(fix: NorthFix, covariance: FloatArray | None, bent_se_deg: float | None) -> list[str]:
+    """Notes on what the samples do not tell, and on a bias that bends."""
+    told = []
+    if fix.drift_deg_h_h is None:
+        told.append("the positions don't tell a drift: the standard error holds without one")
+    if covariance is None:
+        told.append("no standard error: the samples in each position are too few, or hold no noise")
+        return told
+    if fix.se_deg == ANY_DEG:
+        told.append(
+            f"the positions don't tell north: the Earth rate that they show, {fix.horizontal_deg_h:.3g} "
+            "deg/h, is within its noise; stay longer in each"
+        )
+    bend, bend_se, bent = fix.bend_deg_h_h2, fix.bend_se, fix.bent_deg
+    if fix.method == "bend-observing" or bend is None or bent is None or not bend_se:
+        return told
+    moved = abs((bent - fix.azimuth_deg + 180.0) % 360.0 - 180.0)
+    if abs(bend) > _BEND_SHOWS * bend_se and moved > _LAST_DIGIT_DEG:
+        told.append(
+            f"the bias bends during the seek, as at start-up ({abs(bend) / bend_se:.1f} standard errors), "
+            "which the azimuth's standard error does not hold: with the bend taken out (--method "
+            f"bend-observing) it is {bent:.4f} ± {bent_se_deg:.2g} deg"
+        )
+    return told
+
+
+def set_up_notes(
+    run: Run, fix: NorthFix, covariance: FloatArray | None, latitude_deg: float | None
+) -> list[str]:
+    """Notes where the stated set-up and what the positions show part."""
+    told = []
+    axis, latitude = run.facts.input_axis, run.facts.latitude if latitude_deg is None else latitude_deg
+    if axis in ("up", "down"):
+        told.append(
+            f"the side file says that the input axis points {axis}: north is sought with a level one, and of "
+            "a vertical one the azimuth means nothing"
+        )
+    if latitude is None:
+        return [
+            f"no latitude is stated: the horizontal Earth rate is the one seen, {fix.horizontal_deg_h:.4g} "
+            "deg/h",
+            *told,
+        ]
+    expected = horizontal_rate(latitude)
+    tolerance = 0.02 * expected
+    if covariance is not None:
+        tolerance += 5.0 * float(np.sqrt(covariance[:2, :2].trace()))
+    if abs(fix.horizontal_deg_h - expected) > tolerance:
+        told.append(
+            f"the positions show {fix.horizontal_deg_h:.4g} deg/h of Earth rate, {expected:.4g} deg/h were "
+            f"expected at latitude {latitude:g} deg: the axis is not level, the scale factor is off, or the "
+            "positions are not what they are called"
+        )
+    return told
+
+
+def angle_notes(run: Run, times_s: FloatArray, turned_deg: FloatArray, tolerance_deg: float) -> list[str]:
+    """A note where the table's recorded angle goes another way than the positions say.
+
+    Parameters
+    ----------
+    run
+        With a column ``position`` and maybe ``angle``.
+    times_s
+        Middle of each stay.
+    turned_deg
+        Angle of its position, clockwise.
+    tolerance_deg
+        How far the table may be from it.
+    """
+    if "position" not in run.columns or "angle" not in run.columns:
+        return []
+    # The table's angle counts counter-clockwise.
+    recorded = -np.interp(times_s, run.time, run.columns["angle"])
+    recorded, turned = recorded - recorded[0], turned_deg - turned_deg[0]
+
+    def off(way: float) -> FloatArray:
+        return np.abs((recorded - way * turned + 180.0) % 360.0 - 180.0)
+
+    worst = int(np.argmax(off(1.0)))
+    if off(1.0)[worst] <= tolerance_deg:
+        return []
+    other = np.all(off(-1.0) <= tolerance_deg)
+    return [
+        f"the positions say that the gyro stood {turned[worst]:g} deg clockwise of the first at "
+        f"{times_s[worst]:.0f} s, the table's column 'angle', which counts counter-clockwise, says "
+        f"{recorded[worst]:g} deg: "
+        + ("the other --sense, or an angle of the other sign" if other else "check --sense and --order")
+    ]
