@@ -267,17 +267,17 @@ def test_a_bias_that_bends_is_noticed_and_can_be_taken_out() -> None:
     scores, told = {"auto": [], "bend-observing": []}, 0
     for seed in range(30):
         azimuth = 12.0 * seed
-        run = own_seek(seed, azimuth, 40.0, walk=0.001, drift=lambda t: 1.5 * np.exp(-t / 100.0))
+        run = own_seek(seed, azimuth, 40.0, walk=0.001, drift=lambda t: 1.5 * np.exp(-t / 300.0))
         for method, found in scores.items():
             fix = north_from_positions(run, method=method)
             assert fix.se_deg is not None and fix.method == ("drift-observing", method)[method != "auto"]
             found.append(float(wrapped(fix.azimuth_deg - azimuth)) / fix.se_deg)
             told += method == "auto" and "bends" in " ".join(fix.notes)
-    assert told >= 25 and np.std(scores["auto"]) > 2.0 and np.std(scores["bend-observing"]) < 1.5
+    assert told >= 20 and np.std(scores["auto"]) > 1.5 and np.std(scores["bend-observing"]) < 1.2
     straight = [
         north_from_positions(own_seek(s, 77.0, 40.0, walk=0.001, drift=np.zeros_like)) for s in range(20)
     ]
-    assert not any(fix.notes for fix in straight)
+    assert sum(bool(fix.notes) for fix in straight) <= 1
 
 
 def test_a_set_up_that_the_run_contradicts_is_noted() -> None:
