@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from experiments.lab_uncertainty import (
+    cards,
     certificates,
     fleets,
     floors,
@@ -116,6 +117,15 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         "signals are fogml's: the twin's replay at constants drawn from its priors, under noise in plain "
         "NumPy. Of a pair as far apart as `plan` takes to be enough the normal distribution has the other "
         "one fit better in the share stated.",
+    ),
+    (
+        "Sizes and shapes of causes (`diagnose`)",
+        cards,
+        10,
+        "Effects put into runs in the catalogue's own form, d′ 30, shapes drawn from its priors; the cause's "
+        "name, the noise and all else are known. So fogml's signatures are fitted to themselves: real forms "
+        "are others. That no form is known more exactly than to 4 % makes intervals of amplitudes wide here. "
+        "Told alone are effects whose intervals hold too little.",
     ),
     (
         "A next unit drawn to its fleet (`fleet`)",

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from fogml.arrays import FloatArray
-from fogml.gap.causes import Card
+from fogml.gap.cards import Card
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior

@@ -39,6 +39,11 @@ def signature_of(declared: Effect, only: Sequence[GridNode] | None = None) -> Bu
     return build
 
 
+def driving_of(declared: Effect, rows: Rows, scene: Scene, place: str) -> Mapping[str, FloatArray] | None:
+    """Temperatures of the place of that name which may drive an effect, shape (e,) each."""
+    return next(held for name, held, _ in _driving(declared, rows, scene) if name == place)
+
+
 def nodes_of(declared: Effect, scene: Scene, constants: Constants) -> tuple[GridNode, ...]:
     """The grid of an effect's shapes."""
     key = ("nodes", declared.id)

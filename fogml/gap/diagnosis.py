@@ -9,7 +9,8 @@ import numpy as np
 
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals, joint_uncertainty
-from fogml.gap.causes import cards_of, energy, fitted_values, found_cause
+from fogml.gap.cards import cards_of, fitted_values
+from fogml.gap.causes import energy, found_cause
 from fogml.gap.compensation import compensation_of
 from fogml.gap.how_far import Foretold, HeldOut, cause_shares
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back

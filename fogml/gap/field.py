@@ -276,5 +276,4 @@ def _range_penalties(held: Field, nodes: list[int], lengths: FloatArray) -> Floa
     by_family = np.array([held.usual_most(f) for f in range(len(held.columns.families))])
     highest = by_family[[held.columns.nodes[n].family for n in nodes]]
     scales = np.array([held.scale[n] for n in nodes])
-    over = np.log(np.maximum(scales[:, None] * lengths / highest[:, None], 1.0))
-    return np.asarray(-0.5 * (over / math.log(held.setting.priors.beyond_range)) ** 2)
+    return held.setting.priors.log_usual(scales[:, None] * lengths / highest[:, None])

@@ -146,8 +146,8 @@ class Reported:
         Standard errors from 0 of the change of a size with time from which on it grows or fades.
     onsets
         Times in each run at which a cause may have begun.
-    card_nodes
-        Shapes of a card that are tried at most.
+    card_nodes, card_starts
+        Shapes of a card that are tried at most, and how many of the best least squares go on from.
     averaging_s
         Averaging time of figures that are told.
     fewest_checked
@@ -184,6 +184,7 @@ class Reported:
     grows: float = 3.0
     onsets: int = 8
     card_nodes: int = 400
+    card_starts: int = 3
     averaging_s: float = 100.0
     fewest_checked: int = 64
     draws: int = 40
@@ -300,6 +301,11 @@ class Priors:
     def plant_lengths(self) -> FloatArray:
         """The values of another plant's size, shape (sizes,)."""
         return np.geomspace(self.least_size, self.plant_size, self.sizes)
+
+    def log_usual(self, times_usual: FloatArray) -> FloatArray:
+        """Logarithm of how likely sizes are, over the greatest usual one, against such within their range."""
+        over = np.log(np.maximum(times_usual, 1.0)) / math.log(self.beyond_range)
+        return np.asarray(-0.5 * over**2)
 
     def believed(self, *log_odds: float, log_share: float = 0.0) -> float:
         """Probability of a name, from its odds against each other way to explain what it does.

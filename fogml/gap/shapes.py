@@ -251,6 +251,11 @@ def is_line(quantity: Quantity) -> bool:
     return "period" in quantity.name or "frequency" in quantity.name
 
 
+def is_whole(quantity: Quantity, grids: Grids) -> bool:
+    """Whether a shape parameter counts something."""
+    return quantity.whole or quantity.name in grids.whole
+
+
 def _in_proportion(quantity: Quantity, grade: Grade, response: Response, usual: Mapping[str, float]) -> bool:
     low, high = quantity.range(grade)
     a, m, b = (response({**usual, quantity.name: x}) for x in (low, 0.5 * (low + high), high))
@@ -264,7 +269,7 @@ def _axis(
     low, high = quantity.range(grade)
     if is_line(quantity):
         return _lines(quantity, low, high, spans, grids)
-    if quantity.name in grids.whole:
+    if is_whole(quantity, grids):
         return [float(x) for x in np.arange(math.ceil(low), math.floor(high) + 1)]
     if quantity.unit == "degC" and "temperature" in quantity.name:
         # A place on the temperature scale is told to a fraction of what happens there.

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fogml.gap.causes import cards_of, onset
+from fogml.gap.cards import cards_of
+from fogml.gap.causes import onset
 from fogml.gap.diagnosis import _closed_share, with_epoch
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import infer

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.gap.causes import card_of
+from fogml.gap.cards import card_of
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.model import EffectValue, TwinModel

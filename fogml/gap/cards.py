@@ -1,0 +1,226 @@
+"""Causes in their cards' terms: amplitude and shape by least squares, standard errors from the curvature."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from fogml.gap.card_form import Form, Optimum
+from fogml.gap.catalogue import nodes_of, signature_of
+from fogml.gap.field import Field, Member, apart
+from fogml.gap.inference import Inference
+from fogml.gap.linear_gaussian import LinearGaussian
+from fogml.gap.model import EffectValue
+from fogml.gap.posterior import Cause, Judgement
+from fogml.gap.rows import Rows
+from fogml.gap.shapes import GridNode, is_angle, is_line
+from fogml.runs.steps import FINEST_STEP_DEGC, WHOLE, recorded_step
+from fogml.twin.effect import Effect
+
+Start = tuple[str, float, Mapping[str, float]]
+"""Name of the place that drives an effect, amplitude and shape."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """An effect's amplitude and shape with standard errors."""
+
+    value: EffectValue
+    amplitude_se: float
+    shape_se: Mapping[str, float]
+
+
+def cards_of(found: Inference, judged: Judgement) -> dict[str, Card]:
+    """Each cause's card, by its effect."""
+    cards = {}
+    for cause in judged.causes:
+        beside = beside_others(found, judged.best.members, cause)
+        cards[cause.ids[0]] = card_of(cause.ids[0], found.field, beside, _told(found, cause))
+    return cards
+
+
+def beside_others(found: Inference, members: Sequence[Member], cause: Cause) -> LinearGaussian:
+    """The data beside constants and all members but a cause's."""
+    return found.field.beside(m for m in members if m not in cause.members)
+
+
+def _told(found: Inference, cause: Cause) -> Mapping[str, Any]:
+    """Shape that a cause's family tells, such as a period."""
+    return found.columns.nodes[cause.member.node].shape
+
+
+def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, Any]) -> Card:
+    """The catalogue's form of an effect that fits best beside everything else.
+
+    Parameters
+    ----------
+    id
+        Of the effect.
+    field
+        Runs, and what is whitened.
+    beside
+        The data beside constants and all other causes.
+    told
+        Shape that the cause's family tells, such as a period.
+
+    Notes
+    -----
+    The best nodes of the effect's grid are where least squares begin. What distinct optima differ by, each
+    as likely as it fits, is part of the standard errors, and so is that no form is known exactly.
+    """
+    setting, scene = field.setting, field.setting.scene
+    declared = scene.candidates[id]
+    if declared.drawn_per_run or declared.family in ("line", "power_cycles"):
+        return _drawn(declared, told, field, beside)
+    angles = [q.name for q in declared.shape if is_angle(q)]
+    optima: list[Optimum] = []
+    for place, amplitude, shape in _starts(declared, field, beside, told):
+        optimum = Form(declared, field, beside, place).optimum(amplitude, shape)
+        # Two that make the same of the runs, to less than noise, are one.
+        if all(float(np.linalg.norm(optimum.made - other.made)) > 1.0 for other in optima):
+            optima.append(optimum)
+    _, usual = declared.amplitude.range(scene.grade)
+    sizes = np.array([optimum.amplitude for optimum in optima])
+    fits = np.array([optimum.fit for optimum in optima]) + setting.priors.log_usual(np.abs(sizes) / usual)
+    best = optima[int(np.argmax(fits))]
+    weights = np.exp(fits - fits.max())
+    weights /= weights.sum()
+    values = [_facing(best, optimum, angles) for optimum in optima]
+    amplitude, form_se = best.amplitude, setting.priors.form_error * best.amplitude
+    off = np.array([size - amplitude for size, _ in values])
+    se = math.sqrt(best.amplitude_se**2 + float(weights @ off**2) + form_se**2)
+    shape_se = {}
+    for name, value in best.shape.items():
+        off = np.array([shape[name] - value for _, shape in values])
+        off = (off + 180.0) % 360.0 - 180.0 if name in angles else off
+        shape_se[name] = math.hypot(best.shape_se[name], math.sqrt(float(weights @ off**2)))
+    if any(best.shape_se[name] >= 180.0 for name in angles):
+        # What shows is the part along one direction; of two in three the whole is up to twice as large.
+        se = math.hypot(se, amplitude)
+    if getattr(declared, "digitises", False):
+        amplitude, se = _step(scene.fit, amplitude, se)
+    return Card(EffectValue(id, amplitude, best.shape), se, shape_se)
+
+
+def _starts(declared: Effect, field: Field, beside: LinearGaussian, told: Mapping[str, Any]) -> list[Start]:
+    """Of the nodes of an effect's grid that explain most the place that drives them, amplitude and shape."""
+    setting, scene = field.setting, field.setting.scene
+    reported = setting.priors.reported
+    nodes = _near_lines(declared, nodes_of(declared, scene, setting.values), told)[: reported.card_nodes]
+    build = signature_of(declared, nodes)
+    by_run = [list(islice(build(r, scene, setting.values), reported.card_nodes)) for r in scene.fit]
+    stacked = field.whitening.stacked([np.concatenate([b.columns for b in own], axis=1) for own in by_run])
+    least = max(map(abs, declared.amplitude.limits)) ** -2.0
+    angles = [q.name for q in declared.shape if is_angle(q)]
+
+    _, usual = declared.amplitude.range(scene.grade)
+    tried: list[tuple[float, Start]] = []
+    at = 0
+    for i, block in enumerate(by_run[0]):
+        node, width = nodes[i % len(nodes)], block.columns.shape[1]
+        columns = stacked[:, at : at + width]
+        at += width
+        gram, fits = beside.gram(columns), beside.fits(columns)
+        # What would stay below a standard deviation at the greatest amplitude that there is tells nothing.
+        scale = np.sqrt(np.maximum(np.diagonal(gram), max(least, 1e-300)))
+        inverse = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-6, hermitian=True)
+        weights = node.mix @ (inverse @ (fits / scale) / scale)
+        gain = 0.5 * float(fits / scale @ inverse @ (fits / scale))
+        # Of the node's directions the one that most goes along, turned round where it opposes.
+        sizes = weights.reshape(-1, node.turns).sum(axis=0)
+        way = int(np.argmax(np.abs(sizes)))
+        size, shape = float(sizes[way]), node.draws[way]
+        if node.turns > 1 and size < 0.0:
+            size, shape = _opposite(size, shape, angles)
+        gain += float(setting.priors.log_usual(np.abs(sizes[way]) / usual))
+        tried.append((gain, (str(block.shape["place"]), size, shape)))
+    tried.sort(key=lambda one: -one[0])
+    starts = [start for _, start in tried[: reported.card_starts]]
+    # The opposite direction of the opposite sign is another answer where a part does not turn.
+    place, size, shape = starts[0]
+    both = angles and declared.amplitude.signed
+    return [*starts, (place, *_opposite(size, shape, angles))] if both else starts
+
+
+def _opposite(
+    amplitude: float, shape: Mapping[str, float], angles: Sequence[str]
+) -> tuple[float, Mapping[str, float]]:
+    """The opposite sign and direction, which make the same of all that turns with it."""
+    return -amplitude, {**shape, **{name: shape[name] + 180.0 for name in angles}}
+
+
+def _facing(best: Optimum, other: Optimum, angles: Sequence[str]) -> tuple[float, Mapping[str, float]]:
+    """Amplitude and shape of an optimum, in the sign of another where there is a direction."""
+    opposed = bool(angles) and other.amplitude * best.amplitude < 0.0
+    told = other.amplitude, other.shape
+    return _opposite(*told, angles) if opposed else told
+
+
+def _near_lines(declared: Effect, nodes: Sequence[GridNode], told: Mapping[str, Any]) -> Sequence[GridNode]:
+    """Nodes by how near their period or frequency is to one that a family tells, such of it first."""
+    for quantity in filter(is_line, declared.shape):
+        name, kind = quantity.name, "period" if "period" in quantity.name else "frequency"
+        line = told.get(name, told.get(kind))
+        if isinstance(line, float) and line > 0.0:
+            near = sorted(nodes, key=lambda node: abs(math.log(node.shape[name] / line)))
+            nearest = [node for node in near if node.shape[name] == near[0].shape[name]]
+            at = {name: float(np.clip(line, *quantity.limits))}
+            of_it = [
+                replace(node, shape={**node.shape, **at}, draws=tuple({**draw, **at} for draw in node.draws))
+                for node in nearest
+            ]
+            return [*of_it, *near]
+    return nodes
+
+
+def _step(runs: Sequence[Rows], amplitude: float, se: float) -> tuple[float, float]:
+    """The coarsest step of the recorded temperatures and what it is uncertain by, where they show one."""
+    held = [recorded_step(r.run.columns[name]) for r in runs for name in r.run.temperature_columns]
+    step = max(held, default=0.0)
+    return (step, 0.5 * WHOLE * step) if step >= FINEST_STEP_DEGC else (amplitude, se)
+
+
+def _drawn(declared: Effect, told: Mapping[str, Any], field: Field, beside: LinearGaussian) -> Card:
+    """The spread over runs of an effect that each draws anew: a standard deviation, or a line's amplitude."""
+    scene = field.setting.scene
+    runs, shape = scene.fit, declared.default_shape(scene.grade)
+    shape |= {name: float(told[name]) for name in shape if isinstance(told.get(name), float)}
+    own = []
+    for rows in runs:
+        if declared.family == "line":
+            phase = 2.0 * np.pi * shape["frequency"] * rows.time_s
+            own.append(np.column_stack([np.sin(phase), np.cos(phase)]))
+        else:
+            own.append(rows.response(declared, shape, None, field.setting.values)[:, None])
+    columns = field.whitening.stacked(apart(own, len(runs)))
+    inverse = np.linalg.pinv(beside.gram(columns), rcond=1e-6, hermitian=True)
+    each = (inverse @ beside.fits(columns)).reshape(len(runs), -1)
+    size = float(np.sqrt(np.mean(np.sum(each**2, axis=1))))
+    noise = float(np.sqrt(np.trace(inverse)) / len(runs))
+    se = math.hypot(noise, size / math.sqrt(2.0 * max(len(runs) - 1, 1)))
+    amplitude = float(np.clip(size, *declared.amplitude.limits))
+    return Card(EffectValue(declared.id, amplitude, dict(shape)), se, {})
+
+
+def fitted_values(
+    found: Inference, judged: Judgement, named: Sequence[Cause], cards: Mapping[str, Card]
+) -> tuple[EffectValue, ...]:
+    """What the model with the named causes has of each: of an effect that it had already, all of it."""
+    had = {declared.id: (declared, setting) for declared, setting in found.plant.on}
+    values = []
+    for cause in named:
+        id = cause.ids[0]
+        if id not in had:
+            values.append(cards[id].value)
+            continue
+        declared, setting = had[id]
+        held = beside_others(found, judged.best.members, cause)
+        more = setting.amplitude * found.field.response(declared, setting.shape)
+        whole = replace(held, data=held.data + more)
+        values.append(card_of(id, found.field, whole, _told(found, cause)).value)
+    return tuple(values)
