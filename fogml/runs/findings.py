@@ -19,6 +19,14 @@ FIRST_OF_ALL = (
     "marks_of_thousands",
 )
 """Codes of the findings that make every figure wrong, and are said before any other."""
+IMPLAUSIBLE = {
+    "already_compensated": "the output",
+    "implausible_temperature": "the temperature",
+    "thermometers_apart": "the temperature",
+    "implausible_earth_rate": "the output or the attitude",
+    "implausible_scale_factor": "the output or the table's rate",
+}
+"""What can't be as the run states it, by the code of the finding."""
 
 
 def first_of_all(findings: Iterable[Finding]) -> list[Finding]:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.intervals import LEVEL
 from fogml.models.box import LEAST_SPAN_DEGC, ways_moved
-from fogml.validation.floors import floor_interval
+from fogml.validation.reasons import Grade, Reason, gained_reasons, implausible_reasons, still_reason
 from fogml.validation.results import Judgement, RunJudgement
 
-Grade = Literal["use", "use_with_care", "do_not_use"]
 SEEN = "seen_in_training"
 """Code of the finding that a test run holds the samples of a training run."""
 
@@ -47,16 +44,6 @@ class Asked:
     mostly_still: float = 0.5
     beside: float = 0.05
     coverage: float = 0.8
-
-
-@dataclass(frozen=True)
-class Reason:
-    """One thing that decides: how far, in a few words, in a sentence, and what to do about it."""
-
-    grade: Grade
-    brief: str
-    sentence: str
-    next_step: str
 
 
 @dataclass(frozen=True)
@@ -137,12 +124,15 @@ def coverage(run: RunJudgement) -> float | None:
 
 def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
     for runs, what in ((judgement.train, "learnt"), (judgement.test, "judged")):
-        yield from (still for run in runs if (still := _still(run, asked, what)))
+        for run in runs:
+            if (still := still_reason(run, asked.mostly_still, what)) is not None:
+                yield still
+            yield from implausible_reasons(run)
     yield from _not_judged(judgement)
     yield from _one_way(judgement)
     yield from _one_temperature(judgement)
     for run in judgement.test:
-        still = _still(run, asked, "judged")
+        still = still_reason(run, asked.mostly_still, "judged")
         if still is None or still.grade != "do_not_use":
             yield from _of_run(run, asked)
     better, told = which_to_use(judgement, asked)
@@ -150,21 +140,6 @@ def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
         yield Reason("do_not_use", f"{better} leaves less", told, f"Train {better} in its place.")
     yield from _limits(judgement)
     yield from _another_unit(judgement)
-
-
-def _still(run: RunJudgement, asked: Asked, what: str) -> Reason | None:
-    """What speaks against a model where the gyro's output stood still."""
-    if run.still is None:
-        return None
-    told, share = run.still
-    mostly = share > asked.mostly_still
-    how = f"nothing is {what} there" if mostly else f"what is {what} there goes by it"
-    return Reason(
-        "do_not_use" if mostly else "use_with_care",
-        f"the output of {run.run} stands still",
-        f"{run.run}: {told}. At {share:.0%} of the samples the output stands still: {how}.",
-        f"See whether the gyro was connected and switched on, and record {run.run} again.",
-    )
 
 
 def _not_judged(judgement: Judgement) -> Iterator[Reason]:
@@ -196,62 +171,8 @@ def _one_way(judgement: Judgement) -> Iterator[Reason]:
     )
 
 
-def _gained(run: RunJudgement) -> Iterator[Reason]:
-    """What a run says for or against the model by how much it takes away there."""
-    before, after = run.before.rms, run.after.rms
-    upper = run.floor if run.floor_ci90 is None else run.floor_ci90[1]
-    noise = floor_interval(upper, len(run.series.time))[1]
-    gained = before - after
-    # The mean of one run also holds what its power-on shifted, by chance: that is no merit and no fault.
-    steadier = run.before.bias_stability - run.after.bias_stability
-    # By squares, as drift and noise add up: where noise is half of it, drift that is gone hardly shows.
-    pairs = ((before, after), (run.before.bias_stability, run.after.bias_stability))
-    taken = math.sqrt(max(0.0, *(a**2 - b**2 for a, b in pairs)))
-    within = f"{run.before.bias_stability:.3g} deg/h of bias stability become {run.after.bias_stability:.3g}"
-    if gained < 0.0 and after > noise and steadier >= run.floor:
-        yield Reason(
-            "use_with_care",
-            f"the mean of {run.run} moved",
-            f"Within {run.run} {within}, but its mean lies {run.after.bias:.3g} deg/h off, "
-            f"{run.before.bias:.3g} without the model: that power-on shifted it, or the model did.",
-            "Judge it on more runs: their means tell which, and how repeatable the bias is.",
-        )
-    elif gained < 0.0 and after > noise:
-        yield Reason(
-            "do_not_use",
-            f"worse than none on {run.run}",
-            f"It makes {run.run} worse: {after:.3g} deg/h rms after, {before:.3g} before.",
-            "Train on runs that are like the ones it is used on, or leave the output as it is.",
-        )
-    elif taken < run.floor:
-        only_noise = after <= noise
-        yield Reason(
-            "use_with_care" if only_noise else "do_not_use",
-            f"takes away less than the noise on {run.run}",
-            f"On {run.run} {before:.3g} deg/h rms become {after:.3g}: {taken:.3g} is taken away, less than "
-            f"the noise floor of {run.floor:.3g}{', and only noise is left' if only_noise else ''}.",
-            "Leave the output as it is." if only_noise else "Compare other models (fogml compare).",
-        )
-    elif max(gained, steadier) < run.floor and after > noise:
-        yield Reason(
-            "use_with_care",
-            f"leaves most of it on {run.run}",
-            f"On {run.run} {before:.3g} deg/h rms become {after:.3g}: less is gained than the noise floor of "
-            f"{run.floor:.3g}, and more is left.",
-            "Compare other models (fogml compare).",
-        )
-    elif steadier < -run.floor:
-        yield Reason(
-            "use_with_care",
-            f"less steady than without on {run.run}",
-            f"The mean of {run.run} comes out nearer, but within it {within}: that power-on may have shifted "
-            "the mean that way.",
-            "Judge it on more runs, or compare other models (fogml compare).",
-        )
-
-
 def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
-    against = list(_gained(run))
+    against = list(gained_reasons(run))
     yield from against
     if run.outside_training > asked.outside:
         mostly = run.outside_training > asked.mostly_outside

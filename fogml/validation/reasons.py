@@ -1,0 +1,107 @@
+"""What a single run says for or against the use of a model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from fogml.runs.findings import IMPLAUSIBLE
+from fogml.validation.floors import floor_interval
+from fogml.validation.results import RunJudgement
+
+Grade = Literal["use", "use_with_care", "do_not_use"]
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One thing that decides: how far, in a few words, in a sentence, and what to do about it."""
+
+    grade: Grade
+    brief: str
+    sentence: str
+    next_step: str
+
+
+def still_reason(run: RunJudgement, mostly_still: float, what: str) -> Reason | None:
+    """What speaks against a model where the gyro's output stood still."""
+    if run.still is None:
+        return None
+    told, share = run.still
+    mostly = share > mostly_still
+    how = f"nothing is {what} there" if mostly else f"what is {what} there goes by it"
+    return Reason(
+        "do_not_use" if mostly else "use_with_care",
+        f"the output of {run.run} stands still",
+        f"{run.run}: {told}. At {share:.0%} of the samples the output stands still: {how}.",
+        f"See whether the gyro was connected and switched on, and record {run.run} again.",
+    )
+
+
+def implausible_reasons(run: RunJudgement) -> Iterator[Reason]:
+    """What speaks against a model where the numbers of a run can't be what they are stated to be."""
+    for finding in run.findings:
+        if finding.code in IMPLAUSIBLE:
+            told = IMPLAUSIBLE[finding.code]
+            yield Reason(
+                "use_with_care",
+                f"{told} of {run.run} can't be as stated",
+                f"{run.run}: {finding.message}. If it is wrong, so is every figure here, and what the model "
+                "makes of another run.",
+                f"Put {told} of {run.run} right, or make sure of it, and train and judge again.",
+            )
+
+
+def gained_reasons(run: RunJudgement) -> Iterator[Reason]:
+    """What a run says for or against the model by how much it takes away there."""
+    before, after = run.before.rms, run.after.rms
+    upper = run.floor if run.floor_ci90 is None else run.floor_ci90[1]
+    noise = floor_interval(upper, len(run.series.time))[1]
+    gained = before - after
+    # The mean of one run also holds what its power-on shifted, by chance: that is no merit and no fault.
+    steadier = run.before.bias_stability - run.after.bias_stability
+    # By squares, as drift and noise add up: where noise is half of it, drift that is gone hardly shows.
+    pairs = ((before, after), (run.before.bias_stability, run.after.bias_stability))
+    taken = math.sqrt(max(0.0, *(a**2 - b**2 for a, b in pairs)))
+    within = f"{run.before.bias_stability:.3g} deg/h of bias stability become {run.after.bias_stability:.3g}"
+    if gained < 0.0 and after > noise and steadier >= run.floor:
+        yield Reason(
+            "use_with_care",
+            f"the mean of {run.run} moved",
+            f"Within {run.run} {within}, but its mean lies {run.after.bias:.3g} deg/h off, "
+            f"{run.before.bias:.3g} without the model: that power-on shifted it, or the model did.",
+            "Judge it on more runs: their means tell which, and how repeatable the bias is.",
+        )
+    elif gained < 0.0 and after > noise:
+        yield Reason(
+            "do_not_use",
+            f"worse than none on {run.run}",
+            f"It makes {run.run} worse: {after:.3g} deg/h rms after, {before:.3g} before.",
+            "Train on runs that are like the ones it is used on, or leave the output as it is.",
+        )
+    elif taken < run.floor:
+        only_noise = after <= noise
+        yield Reason(
+            "use_with_care" if only_noise else "do_not_use",
+            f"takes away less than the noise on {run.run}",
+            f"On {run.run} {before:.3g} deg/h rms become {after:.3g}: {taken:.3g} is taken away, less than "
+            f"the noise floor of {run.floor:.3g}{', and only noise is left' if only_noise else ''}.",
+            "Leave the output as it is." if only_noise else "Compare other models (fogml compare).",
+        )
+    elif max(gained, steadier) < run.floor and after > noise:
+        yield Reason(
+            "use_with_care",
+            f"leaves most of it on {run.run}",
+            f"On {run.run} {before:.3g} deg/h rms become {after:.3g}: less is gained than the noise floor of "
+            f"{run.floor:.3g}, and more is left.",
+            "Compare other models (fogml compare).",
+        )
+    elif steadier < -run.floor:
+        yield Reason(
+            "use_with_care",
+            f"less steady than without on {run.run}",
+            f"The mean of {run.run} comes out nearer, but within it {within}: that power-on may have shifted "
+            "the mean that way.",
+            "Judge it on more runs, or compare other models (fogml compare).",
+        )
