@@ -3,13 +3,11 @@
 What is being written lies in a folder ``.partial-HOST-TOKEN``, locked by its process. Where several
 entries have to be renamed one by one it is first renamed itself, to ``.commit-HOST-TOKEN``: from
 then on the next writer in the same place, should this one be killed, moves in what is left. What a
-dead process of this host left otherwise, the next writer removes.
+dead process of this host left otherwise, the next writer removes, locks of outputs with it.
 """
 
 from __future__ import annotations
 
-import errno
-import json
 import os
 import re
 import secrets
@@ -17,17 +15,14 @@ import shutil
 import socket
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from fogml.errors import FogmlError, InputError
-from fogml.folders import FileLock, exchange_whole, has_to_stay, is_folder, nearest_folder
-from fogml.processes import process_is_alive, process_start
+from fogml.folders import exchange_whole, has_to_stay, is_folder, nearest_folder
+from fogml.locks import NO_ROOM, FileLock, remove_left_locks, sole_writer, unwritable
 
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-"""Errors of a disk that takes no more."""
 PARTIAL, COMMIT = ".partial-", ".commit-"
 _CONTENT, _LOCK = "content", "lock"
 
@@ -120,47 +115,15 @@ def scratch_folder() -> Iterator[Path]:
         yield staging.content
 
 
-@contextmanager
-def sole_writer(path: str | Path) -> Iterator[None]:
-    """Hold the lock on an output, a file ``.NAME.lock`` beside it that names process and host.
-
-    The system takes the lock back from a process that has ended, on whichever host of a shared file
-    system. Where the file system has no locks, what the file states counts: a process of this host by
-    whether it lives, one of another host as living.
-    """
-    real = Path(os.path.realpath(path))
-    home = real if real.is_dir() and has_to_stay(real) else nearest_folder(real.parent)
-    name = "+".join(real.relative_to(home).parts)
-    lock = FileLock(home / f".{name}.lock")
-    try:
-        free = lock.acquire(wait=False)
-    except OSError as error:
-        raise _unwritable(path, error) from error
-    try:
-        told = lock.read() if free else _read(lock.path)
-        owner = _owner(told)
-        if not free or (not lock.sure and _may_live(owner)):
-            lock.release()
-            who = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
-            raise InputError(
-                f"{path}: {who} is writing it; wait for that to end, or choose another --out "
-                f"(if no such process runs any more, remove {lock.path})"
-            )
-        pid = os.getpid()
-        lock.write(json.dumps({"pid": pid, "host": socket.gethostname(), "started": process_start(pid)}))
-        yield
-    finally:
-        lock.remove()
-
-
 def settle(home: str | Path) -> None:
     """Finish or remove what dead processes of this host left half-written in a folder."""
     home = Path(home)
     try:
-        left = [entry.name for entry in os.scandir(home) if _KIND.match(entry.name)]
+        names = sorted(entry.name for entry in os.scandir(home))
     except OSError:
         return
-    for name in sorted(left):
+    remove_left_locks(home, names)
+    for name in filter(_KIND.match, names):
         staging = _Staging(home / name)
         try:
             if not staging.lock.acquire(wait=False):
@@ -175,6 +138,31 @@ def settle(home: str | Path) -> None:
                 shutil.rmtree(staging.path, ignore_errors=True)
         finally:
             staging.lock.release()
+
+
+@contextmanager
+def settled(*homes: str | Path) -> Iterator[None]:
+    """Around processes that write into folders: what is half-written when they are ended is settled."""
+    try:
+        yield
+    finally:
+        for home in homes:
+            settle(home)
+
+
+@contextmanager
+def folder_to_fill(path: str | Path) -> Iterator[None]:
+    """Make a folder with its parents; where the block fails, those made that hold nothing are removed."""
+    path = Path(path)
+    made = [place for place in (path, *path.parents) if not os.path.lexists(place)]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        with suppress(OSError):
+            for place in made:
+                place.rmdir()
+        raise
 
 
 _HOST = sha256(socket.gethostname().encode()).hexdigest()[:8]
@@ -198,7 +186,7 @@ class _Staging:
         try:
             self.path.mkdir(mode=0o700)
         except OSError as error:
-            raise _unwritable(shown, error) from error
+            raise unwritable(shown, error) from error
         try:
             if not self.lock.acquire(wait=False):
                 return False
@@ -266,7 +254,7 @@ class _Staging:
             elsewhere = error.errno not in NO_ROOM if name is None else str(self.path) not in name
             if elsewhere:
                 raise
-            raise _unwritable(Path(told(name)) if name is not None else output, error) from error
+            raise unwritable(Path(told(name)) if name is not None else output, error) from error
 
 
 @contextmanager
@@ -290,34 +278,3 @@ def _staging(home: Path, shown: Path) -> Iterator[_Staging]:
         except KeyboardInterrupt:
             staging.end()
             raise
-
-
-def _unwritable(path: str | Path, error: OSError) -> Exception:
-    """The error of a full disk with the output's name; of anything else that forbids writing, one message."""
-    if error.errno in NO_ROOM:
-        return OSError(error.errno, error.strerror, str(path))
-    return InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place")
-
-
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
-
-
-def _owner(told: str) -> dict[str, Any]:
-    """Process and host as a lock file states them; nothing where it does not."""
-    try:
-        values = json.loads(told)
-        started = str(values.get("started", ""))
-        return {"pid": int(values["pid"]), "host": str(values["host"]), "started": started}
-    except (ValueError, TypeError, KeyError, AttributeError):
-        return {}
-
-
-def _may_live(owner: dict[str, Any]) -> bool:
-    """Whether the process that a lock file states may still run, as far as this host can tell."""
-    if not owner:
-        return False
-    return owner["host"] != socket.gethostname() or process_is_alive(owner["pid"], owner["started"])

@@ -38,14 +38,29 @@ class Terminated(KeyboardInterrupt):
 
 def end_as_interrupted() -> None:
     """Let SIGTERM and SIGHUP do what the keyboard's interrupt does, unless the caller had them ignored."""
-    for name in ("SIGTERM", "SIGHUP"):
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+        if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _interrupt)
 
 
+def heed_interrupt() -> None:
+    """Raise the interrupt that this process was sent, if any, once more.
+
+    A library may have made another error of it, or none: one that is raised while an extension module loads
+    comes out as an error of that import.
+    """
+    if _asked is not None:
+        raise _asked
+
+
+_asked: KeyboardInterrupt | None = None
+
+
 def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
-    raise Terminated(number)
+    global _asked
+    _asked = KeyboardInterrupt() if number == signal.SIGINT else Terminated(number)
+    raise _asked
 
 
 def quiet_libraries() -> None:

@@ -28,7 +28,7 @@ from fogml.blind.frame.unit import Reality, Unit, UnitRun
 from fogml.blind.plan import FIRST, SAME_TWIN, Plan, Strata, plans, reality
 from fogml.blind.truth import Amount, Runs, Segment, TrueClosed, TrueEffect, Truth, read_truth, write_truth
 from fogml.errors import InputError
-from fogml.outputs import whole_folder
+from fogml.outputs import folder_to_fill, settled, whole_folder
 from fogml.processes import in_processes, one_thread
 from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import Run
@@ -242,18 +242,17 @@ def make_cases(
         raise InputError(f"sample interval {sample_s:g} s: 0.1 to 30 s are possible")
     wanted = plans(first - 1 + count, seed, kinds, least_d_prime, of, d_prime)[first - 1 :]
     folder = BlindFolder(Path(directory))
-    folder.cases.mkdir(parents=True, exist_ok=True)
-    folder.truth.mkdir(parents=True, exist_ok=True)
-    missing = [plan for plan in wanted if not _is_there(folder, plan, seed, sample_s)]
-    done = count - len(missing)
-    if progress:
-        progress(done, count)
-    if missing:
-        make = partial(_make, folder.cases, folder.truth, seed, sample_s)
-        for number, _ in enumerate(in_processes(make, missing, workers), start=1):
-            if progress:
-                progress(done + number, count)
-    write_sums(folder.truth)
+    with folder_to_fill(folder.cases), folder_to_fill(folder.truth), settled(folder.cases, folder.truth):
+        missing = [plan for plan in wanted if not _is_there(folder, plan, seed, sample_s)]
+        done = count - len(missing)
+        if progress:
+            progress(done, count)
+        if missing:
+            make = partial(_make, folder.cases, folder.truth, seed, sample_s)
+            for number, _ in enumerate(in_processes(make, missing, workers), start=1):
+                if progress:
+                    progress(done + number, count)
+        write_sums(folder.truth)
     return len(missing)
 
 

@@ -16,7 +16,7 @@ from fogml.blind.frame.unit import Reality
 from fogml.blind.truth import KINDS, Kind
 from fogml.errors import InputError, known_are
 from fogml.json_files import write_json
-from fogml.outputs import whole_file
+from fogml.outputs import folder_to_fill, whole_file
 
 FIRST = "first"
 """What is drawn from unless another one is chosen, so that a seed goes on giving the same files."""
@@ -245,7 +245,6 @@ def record_use(ledger: Path, seed: int, cases: int, truth_hash: str, figures: di
         "truth": truth_hash,
         "figures": figures,
     }
-    ledger.parent.mkdir(parents=True, exist_ok=True)
     values = {"schema": SCHEMA, "uses": [*uses(ledger), use]}
-    with whole_file(ledger) as partial:
+    with folder_to_fill(ledger.parent), whole_file(ledger) as partial:
         write_json(partial, values, indent=1)

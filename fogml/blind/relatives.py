@@ -20,7 +20,7 @@ from fogml.arrays import FloatArray
 from fogml.blind.folders import BlindFolder, case_files, read_json, write_sums
 from fogml.blind.signatures import Atom, Stack, atoms, free_shape
 from fogml.blind.truth import Truth, read_contributions, read_truth, write_truth
-from fogml.outputs import whole_file
+from fogml.outputs import settled, whole_file
 from fogml.processes import in_processes
 from fogml.signals.noise_model import NoiseModel
 
@@ -160,10 +160,11 @@ def leave_out_relatives(
     """
     names = [name for name in folder.names() if _is_open(folder, name)]
     changed = 0
-    for done, more in enumerate(in_processes(partial(_leave_out, folder), names, workers), 1):
-        changed += bool(more)
-        if progress:
-            progress(done, len(names))
+    with settled(*(folder.cases / name for name in names)):
+        for done, more in enumerate(in_processes(partial(_leave_out, folder), names, workers), 1):
+            changed += bool(more)
+            if progress:
+                progress(done, len(names))
     return changed
 
 
@@ -205,9 +206,10 @@ def measure_forms(
     """
     paths = [folder.truth / f"{name}.json" for name in folder.names()]
     open_ = [path for path in paths if _unmeasured(read_truth(path))]
-    for done, _ in enumerate(in_processes(partial(_measure, folder), open_, workers), 1):
-        if progress:
-            progress(done, len(open_))
+    with settled(folder.truth):
+        for done, _ in enumerate(in_processes(partial(_measure, folder), open_, workers), 1):
+            if progress:
+                progress(done, len(open_))
     if open_:
         write_sums(folder.truth)
     return len(open_)

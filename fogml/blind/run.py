@@ -20,7 +20,7 @@ from fogml.blind.pool import Worker, WorkerLost
 from fogml.blind.sealing import own_roots, within
 from fogml.errors import InputError
 from fogml.json_files import write_json
-from fogml.outputs import whole_folder
+from fogml.outputs import folder_to_fill, settled, whole_folder
 from fogml.processes import in_processes
 from fogml.runs.sources import sources_stamp
 
@@ -250,8 +250,7 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
         return False
     method, samples = plan.name or plan.method, count_samples(case)
     values = outcome_of(name, method, answer, worker.locks, samples, shared.code, files)
-    plan.answers.mkdir(parents=True, exist_ok=True)
-    with whole_folder(plan.answers, shared=True) as staging:
+    with folder_to_fill(plan.answers), whole_folder(plan.answers, shared=True) as staging:
         shutil.copytree(out, staging / name)
         write_json(staging / name / OUTCOME, values, indent=1)
     shutil.rmtree(case)
@@ -266,15 +265,15 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
 def run_oracle(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int]:
     """Answer the cases that are left; returns how many were answered now, and how many failed."""
     left = plan.left()
-    plan.answers.mkdir(parents=True, exist_ok=True)
     if not left:
         return 0, 0
     failed, code = 0, code_state(ORACLE)
     answer = partial(_by_oracle, plan.folder.path, plan.answers, code)
-    for name, done in in_processes(answer, left, plan.workers):
-        failed += not done
-        if progress:
-            progress(name)
+    with folder_to_fill(plan.answers), settled(plan.answers):
+        for name, done in in_processes(answer, left, plan.workers):
+            failed += not done
+            if progress:
+                progress(name)
     return len(left), failed
 
 

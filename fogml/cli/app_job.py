@@ -12,7 +12,7 @@ from fogml.cli.run_commands import AppSettings
 from fogml.cli.settings import SHIPPED, Settings, given_settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, quoted
-from fogml.outputs import sole_writer
+from fogml.locks import sole_writer
 
 INPUTS: Mapping[str, Mapping[str, str]] = {
     "import": {"file": "run", "profile": "profile"},

@@ -13,7 +13,7 @@ from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSetti
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, counted
 from fogml.json_files import write_json
-from fogml.outputs import whole_file, whole_folder
+from fogml.outputs import folder_to_fill, whole_file, whole_folder
 
 if TYPE_CHECKING:
     from fogml.blind.run import RunPlan
@@ -164,8 +164,7 @@ def answer(
                 work.advance(doing=f"{method}: {case}")
 
             answered, failed = run_of(method)(plan, progress)
-        plan.answers.mkdir(parents=True, exist_ok=True)
-        with whole_file(plan.answers / "run.yaml") as partial:
+        with folder_to_fill(plan.answers), whole_file(plan.answers / "run.yaml") as partial:
             partial.write_text(config, encoding="utf-8")
         told[str(plan.name)] = {"answered": answered, "failed": failed}
         terminal.say(f"{method}: {counted(answered, 'case')} answered in {plan.answers}, {failed} failed")

@@ -14,9 +14,10 @@ from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json, label_of
-from fogml.fleet.tasks import DONE, Task, full_disk
+from fogml.fleet.tasks import DONE, FLEET, Task, full_disk
 from fogml.json_files import finite_json, read_json, write_json
-from fogml.outputs import sole_writer, whole_folder
+from fogml.locks import sole_writer
+from fogml.outputs import whole_folder
 from fogml.runs.sources import sources_stamp
 from fogml.tracking import Tracker
 
@@ -66,7 +67,7 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     page = fleet_page(values, name, None if batch is None else "batch.html")
     try:
         with whole_folder(settings.out, shared=True) as folder:
-            write_json(folder / "fleet.json", values, indent=1)
+            write_json(folder / FLEET, values, indent=1)
             (folder / "fleet.html").write_text(page, encoding="utf-8")
             fleet_spreadsheet(values, folder / "fleet.xlsx")
             if batch is not None:
@@ -111,11 +112,9 @@ def _check(settings: FleetSettings) -> None:
 
 
 def _shared(path: str) -> dict[str, Any]:
-    values = read_json(Path(path), "--prior takes a fleet.json")
+    values = read_json(Path(path), f"--prior takes a {FLEET}")
     if not isinstance(values, dict) or "shared" not in values:
-        raise InputError(
-            f"--prior {path}: tells no shared constants; a fleet.json of three units or more does"
-        )
+        raise InputError(f"--prior {path}: tells no shared constants; a {FLEET} of three units or more does")
     shared_model(values["shared"])
     return dict(values["shared"])
 

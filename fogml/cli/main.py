@@ -17,8 +17,8 @@ import click
 from fogml import __version__
 from fogml.cli.given import HELP_NAMES, HelpContext, load
 from fogml.errors import FogmlError, did_you_mean, printable
-from fogml.outputs import NO_ROOM
-from fogml.processes import end_as_interrupted, quiet_libraries
+from fogml.locks import NO_ROOM
+from fogml.processes import end_as_interrupted, heed_interrupt, quiet_libraries
 
 COMMANDS = {
     "demo": (
@@ -169,7 +169,7 @@ class Program(Group):
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            return super().invoke(ctx)
+            return self._invoked(ctx)
         except click.UsageError as error:
             _fail_usage(error)
         except FogmlError as error:
@@ -191,6 +191,15 @@ class Program(Group):
             fail("not enough memory for this; close other programs or use a shorter run")
         except KeyboardInterrupt as interrupt:
             raise click.exceptions.Exit(_interrupted(interrupt)) from None
+
+    def _invoked(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except click.exceptions.Exit:
+            raise
+        except Exception:
+            heed_interrupt()
+            raise
 
 
 def _tell(message: str) -> None:

@@ -12,7 +12,8 @@ from typing import Any
 from fogml.cli.run_commands import MonitorSettings
 from fogml.cli.runs import check_named_once, note_wrong, open_blocks
 from fogml.cli.terminal import UNITS_SHOWN, Terminal, number
-from fogml.errors import InputError, counted
+from fogml.errors import InputError, counted, in_one_line
+from fogml.fleet.tasks import FLEET
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.models.base import DriftModel
 from fogml.monitor.evidence import ChangePrior
@@ -22,8 +23,6 @@ from fogml.monitor.store import open_store
 from fogml.monitor.watch import watch
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
-
-FLEET = "fleet.json"
 
 
 def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
@@ -86,10 +85,13 @@ def _records(settings: MonitorSettings, terminal: Terminal) -> tuple[list[RunRec
             except InputError as error:
                 refused[str(path)] = str(error)
             work.advance()
-    if refused and not records:
-        raise InputError(next(iter(refused.values())))
+    if len(refused) == 1 and not records:
+        raise InputError(*refused.values())
     for reason in refused.values():
         terminal.note(f"not used: {reason}")
+    if refused and not records:
+        first = in_one_line(next(iter(refused.values())))
+        raise InputError(f"none of {len(refused)} runs can be used; the first: {first}")
     return records, refused
 
 

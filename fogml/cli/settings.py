@@ -13,7 +13,8 @@ from pydantic import Field, ValidationError, ValidationInfo, field_validator
 from fogml import __version__
 from fogml.cli.given import Given, option
 from fogml.errors import InputError, known_are, listed, quoted
-from fogml.outputs import check_is_no_folder, sole_writer, whole_file
+from fogml.locks import sole_writer
+from fogml.outputs import check_is_no_folder, whole_file
 from fogml.strict import Strict, first_fault
 from fogml.yaml_text import read_yaml, yaml_text
 

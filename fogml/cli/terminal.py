@@ -17,6 +17,7 @@ import click
 
 from fogml.escaping import terminal_text, visible
 from fogml.json_files import json_text
+from fogml.processes import heed_interrupt
 
 _LINE_EVERY_S = 10.0
 """Where stderr is no terminal, a line on long work this often."""
@@ -169,14 +170,16 @@ def _clock(seconds: float) -> str:
 
 
 class _Silent:
+    """Nothing is shown."""
+
     def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
-        """Nothing is shown."""
+        heed_interrupt()
 
     def doing(self, what: str) -> None:
-        """Nothing is shown."""
+        heed_interrupt()
 
     def reached(self, done: float, total: float, doing: str) -> None:
-        """Nothing is shown."""
+        heed_interrupt()
 
 
 class _Lines:
@@ -197,6 +200,7 @@ class _Lines:
         self.doing(doing)
 
     def doing(self, what: str) -> None:
+        heed_interrupt()
         self._what = what
         now = time.monotonic()
         if now - self._shown < _LINE_EVERY_S:
@@ -237,14 +241,17 @@ def _bar(what: str, total: float | None) -> Iterator[Work]:
 
         class Bar:
             def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
+                heed_interrupt()
                 progress.advance(task, amount)
                 if doing is not None:
                     progress.update(task, description=visible(doing))
 
             def doing(self, what: str) -> None:
+                heed_interrupt()
                 progress.update(task, description=visible(what))
 
             def reached(self, done: float, total: float, doing: str) -> None:
+                heed_interrupt()
                 progress.update(task, completed=done, total=total, description=visible(doing))
 
         yield Bar()

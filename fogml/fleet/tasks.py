@@ -15,11 +15,15 @@ from fogml import __version__
 from fogml.errors import FogmlError, InputError, in_one_line
 from fogml.fleet.manifest import Unit
 from fogml.json_files import read_json, write_json
-from fogml.outputs import NO_ROOM, whole_file
+from fogml.locks import NO_ROOM
+from fogml.outputs import folder_to_fill, whole_file
+from fogml.processes import heed_interrupt
 from fogml.runs.sources import run_sources, sources_stamp
 from fogml.strict import Strict, strictly
 
 OUTCOME_SCHEMA, OUTCOME = "fogml.outcome/1", "outcome.json"
+FLEET = "fleet.json"
+"""What a fleet's units tell together, in the fleet's folder."""
 DONE, FAILED = "done", "failed"
 
 UnitJob = Callable[[Unit, Path], Mapping[str, Any]]
@@ -151,9 +155,10 @@ def run_task(task: Task) -> dict[str, Any]:
     except Exception as error:
         # Whatever one unit runs into, the others go on.
         outcome |= {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}
+    if outcome["status"] == FAILED:
+        heed_interrupt()
     try:
-        task.folder.mkdir(parents=True, exist_ok=True)
-        with whole_file(task.folder / OUTCOME) as partial:
+        with folder_to_fill(task.folder), whole_file(task.folder / OUTCOME) as partial:
             write_json(partial, outcome, indent=1)
     except OSError as error:
         raise full_disk(task.home, error) from error

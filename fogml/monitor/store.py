@@ -18,8 +18,9 @@ import numpy as np
 
 from fogml.databases import engine_settings, parse_url, shown_url, told_by
 from fogml.errors import InputError
+from fogml.locks import sole_writer
 from fogml.monitor.record import NUMBERS, TEXTS, RunRecord
-from fogml.outputs import sole_writer, whole_file
+from fogml.outputs import folder_to_fill, whole_file
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine, Table
@@ -92,8 +93,8 @@ class FolderStore(Store):
     def add(self, records: Sequence[RunRecord]) -> int:
         def write() -> int:
             try:
-                self.folder.mkdir(parents=True, exist_ok=True)
                 with ExitStack() as stack:
+                    stack.enter_context(folder_to_fill(self.folder))
                     try:
                         stack.enter_context(sole_writer(self._file))
                     except InputError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -17,6 +17,7 @@ from fogml.runs.clock_order import in_order
 from fogml.runs.columns import TIME_ON, column_spec, conversion, parse_header
 from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
+from fogml.runs.header_spelling import face_of
 from fogml.runs.other_rate import on_gyro_rows
 from fogml.runs.possible import (
     REPAIR,
@@ -275,8 +276,22 @@ def _internal_columns(
         stated = dict(parse_header(cell) for cell in table.cells)
         if any(stated[name] in ("degC", "K") for name in unknown):
             message += "; a temperature is used once it is called T, T_in, T_out, T1 … or T_case"
+            message += _of_faces(unknown)
         notes.append(Finding("unknown_column", message, column=unknown[0], count=len(unknown)))
     return columns, gyro_unit, tick_s, notes
+
+
+def _of_faces(names: Sequence[str]) -> str:
+    """What to do with temperatures whose names put them inside or outside of something."""
+    faces = {name: face for name in names if (face := face_of(name))}
+    if not faces or len(set(faces.values())) < len(faces):
+        return ""
+    calls = " and ".join(f"'{name}' '{face} [degC]'" for name, face in faces.items())
+    where = " and ".join({"T_in": "inner", "T_out": "outer"}[face] for face in faces.values())
+    return (
+        f"; call {calls} if measured on the coil's {where} face, else 'T_case [degC]' of the housing, "
+        "'T_chamber [degC]' of the air"
+    )
 
 
 def _listed(names: Collection[str]) -> str:

@@ -30,6 +30,12 @@ _SYNONYMS = {
         )
     },
 }  # fmt: skip
+_OF_A_FACE = {
+    "T_in": re.compile(r"inn(?:en|ere?)|inside|内"),
+    "T_out": re.compile(r"(?:au(?:ß|ss)en|(?:ä|ae)u(?:ß|ss)ere?)|out(?:er|side)|外"),
+}
+_OF_A_COIL = re.compile(r"fib(?:re|er)coil|coil|spulen?|光纤环|线圈")
+_AROUND_A_FACE = re.compile(r"temp(?:eratur)?e?|温度?|face|seite|surface|侧|of|the|[._/]|t(?![a-z])")
 _SPELLED = {re.sub(r"[\s_-]", "", name.lower()): name for name in KNOWN}
 _MEANT = {re.sub(r"[\s_-]", "", word): name for name, words in _SYNONYMS.items() for word in words}
 _OF_AN_AXIS = re.compile(r"(?:gyro?|gyroscope|omega|angular(?:rate|velocity)|[gw])([xyz])\Z")
@@ -62,11 +68,13 @@ def canonical_cells(cells: Sequence[str]) -> tuple[str, ...]:
     """
     found = [_parts(cell) for cell in cells]
     taken = {name for name, _ in found if column_spec(name)}
-    is_warm = any((n in ("T", "T_in") or coil_sensor_number(n)) and is_accepted(n, u) for n, u in found)
-    others = Counter(_MEANT.get(_plain(other)) for other, _ in found if column_spec(other) is None)
+    others = Counter(_meant(other) for other, _ in found if column_spec(other) is None)
+    is_warm = others["T_in"] == 1 or any(
+        (n in ("T", "T_in") or coil_sensor_number(n)) and is_accepted(n, u) for n, u in found
+    )
     names = []
     for name, unit in found:
-        meant = _MEANT.get(_plain(name))
+        meant = _meant(name)
         alone = others[meant] == 1
         sound = meant is not None and meant not in taken and alone and is_accepted(meant, unit)
         if sound and not (meant == "T" and (is_warm or unit is None)):
@@ -75,6 +83,25 @@ def canonical_cells(cells: Sequence[str]) -> tuple[str, ...]:
         else:
             names.append((name, unit))
     return tuple(f"{name} [{unit}]" if unit is not None else name for name, unit in names)
+
+
+def face_of(name: str) -> str | None:
+    """``T_in`` or ``T_out`` of a temperature that a name puts inside or outside, of whatever; else None.
+
+    ``Temperatur außen`` may be of the coil's outer face, of the case or of the air: who wrote it knows.
+    """
+    plain = _OF_A_COIL.sub("", _plain(name))
+    found = [face for face, words in _OF_A_FACE.items() if words.search(plain)]
+    if len(found) != 1 or not re.search("temp|温|coil|spule|^t", _plain(name)):
+        return None
+    rest = _AROUND_A_FACE.sub("", _OF_A_FACE[found[0]].sub("", plain, count=1))
+    return None if rest else found[0]
+
+
+def _meant(name: str) -> str | None:
+    """The column of the run format that a word means; a face of the coil only where the coil is named."""
+    plain = _plain(name)
+    return _MEANT.get(plain) or (face_of(name) if _OF_A_COIL.search(plain) else None)
 
 
 def with_units_below(cells: Sequence[str], row: Sequence[str]) -> tuple[str, ...] | None:
@@ -116,7 +143,7 @@ def _parts(cell: str) -> tuple[str, str | None]:
         if known is not None:
             return known, of_it
     for text, of_it in _splits(signs(cell)):
-        if _plain(text) in _MEANT and of_it is not None and is_unit(of_it):
+        if _meant(text) is not None and of_it is not None and is_unit(of_it):
             return text, of_it
     if (match := _FORMS[0].match(cell)) and match["name"] and is_unit(match["unit"]):
         return match["name"], canonical_unit(match["unit"])

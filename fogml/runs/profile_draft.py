@@ -18,7 +18,7 @@ from fogml.runs.csv_dialect import decoded_head
 from fogml.runs.csv_header import fields_of, is_number_like, labview_header
 from fogml.runs.csv_numbers import PLAIN, Marks, marks_of, number
 from fogml.runs.csv_source import CsvSource
-from fogml.runs.header_spelling import canonical_cells, with_units_below
+from fogml.runs.header_spelling import canonical_cells, face_of, with_units_below
 from fogml.runs.opening import opened
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.runs.reader_process import stored_file
@@ -193,8 +193,10 @@ def _columns(fields: Sequence[_Field]) -> list[str]:
     lines.append("  gyro: " + _gyro(gyros[0] if gyros else None, many))
     used: set[str] = set()
     warm_before = len(lines)
-    for one in _taken(left, _is_of_a_run):
-        lines.append(_other(one, used))
+    of_a_run = _taken(left, _is_of_a_run)
+    faces = [face_of(one.name) for one in of_a_run]
+    for one, face in zip(of_a_run, faces if "T_in" in faces else [None] * len(faces), strict=True):
+        lines.append(_other(one, face, used))
     if len(lines) == warm_before and (rest := sorted((f for f in left if f not in gyros), key=_takes_few)):
         lines.append(f"  # T: {{source: {_quoted(rest[0].source)}, unit: degC}}    # a drift model needs one")
     if many:
@@ -274,15 +276,18 @@ def _gyro(one: _Field | None, many: bool) -> str:
     return f"{{{source}unit: {unit or 'deg/s'}}}    {_MARK}{why}"
 
 
-def _other(one: _Field, used: set[str]) -> str:
-    """The entry of a temperature or another column of the run format."""
-    name = one.name if column_spec(one.name) is not None and one.name not in used else ""
-    name = name or next(n for n in ["T", *(f"T{i}" for i in range(1, 99))] if n not in used)
+def _other(one: _Field, face: str | None, used: set[str]) -> str:
+    """The entry of a temperature, perhaps of a face of the coil, or another column of the run format."""
+    others = ["T", *(f"T{i}" for i in range(1, 99))]
+    named = [name for name in (one.name, face) if name is not None and column_spec(name) is not None]
+    name = next(n for n in [*named, *others] if n not in used)
+    guessed = name == face != one.name
     used.add(name)
     spec = column_spec(name)
     assert spec is not None
     if one.unit is not None and is_accepted(name, one.unit):
-        return f"  {name}: {{source: {_quoted(one.source)}, unit: {one.unit}}}"
+        doubt = f"    {_MARK}of the coil's face? else T_case or T_chamber" if guessed else ""
+        return f"  {name}: {{source: {_quoted(one.source)}, unit: {one.unit}}}{doubt}"
     values = one.numbers
     warm = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
     unit = "K" if spec.internal == "degC" and warm > _KELVIN else spec.internal

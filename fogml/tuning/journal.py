@@ -11,7 +11,7 @@ from typing import Any
 
 from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 
-from fogml.folders import ARE_KNOWN, FileLock
+from fogml.locks import ARE_KNOWN, FileLock
 
 
 class WholeLines(JournalFileBackend):
@@ -27,7 +27,8 @@ class WholeLines(JournalFileBackend):
             # Optuna's own locks are files that a killed process leaves behind.
             lock: Any = JournalFileOpenLock(file_path)
         else:
-            lock = FileLock(path.with_name(f".{path.name}.lock"))
+            # The journal itself is locked: it is only ever added to, and no other file is left.
+            lock = FileLock(path)
         self._journal, self._guard = path, lock
         super().__init__(file_path, lock_obj=lock)
 

@@ -302,6 +302,41 @@ def test_termination_is_status_143(monkeypatch):
     assert runner.invoke(main.app, ["train"]).exit_code == 143
 
 
+SWALLOWED = """
+import os, signal, sys
+from fogml.cli import command, main
+from fogml.errors import InputError
+
+def do_job(settings, name, terminal):
+    number, error = sys.argv[1], sys.argv[2]
+    try:
+        os.kill(os.getpid(), getattr(signal, number))
+    except KeyboardInterrupt:
+        pass
+    with terminal.work("training") as work:
+        if error == "none":
+            work.advance()
+    raise {"import": ImportError, "input": InputError, "none": AssertionError}[error]("a library's own words")
+
+command.do_job = do_job
+main.app = lambda prog_name, app=main.app: app(["docs"], prog_name=prog_name)
+main.main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "status"),
+    [("SIGTERM", "import", 143), ("SIGINT", "input", 130), ("SIGINT", "none", 130)],
+)
+def test_an_interrupt_that_a_library_makes_another_error_of_is_one(tmp_path, name, error, status):
+    """Raised while an extension module loads it comes out as an ImportError: that was exit 3."""
+    command = [sys.executable, "-c", SWALLOWED, name, error]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (status, "")
+    assert done.stderr.startswith("fogml: interrupted:")
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_program_runs():
     found = run_program("--version")
     assert (found.returncode, found.stderr) == (0, "")

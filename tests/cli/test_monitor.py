@@ -60,6 +60,19 @@ def test_a_run_that_cannot_be_used_is_told_and_holds_up_no_other(service, tmp_pa
     assert invoke_json("monitor", model, "-o", out)["refused"] == []
 
 
+def test_of_runs_that_are_all_unusable_each_is_told(service, tmp_path, invoke):
+    model, _ = service
+    bad = [tmp_path / f"bad-{n}.csv" for n in range(3)]
+    for path, header in zip(
+        bad, ("time [s],gyro [deg/h]", "time [s],T [degC]", "gyro [deg/h],T [degC]"), strict=True
+    ):
+        path.write_text(header + "\n" + "".join(f"{n},{n % 5}\n" for n in range(700)))
+    told = invoke("monitor", model, *bad, "-o", tmp_path / "out", status=2).stderr.splitlines()
+    assert [sum(path.name in line for line in told) for path in bad] == [2, 1, 1]
+    assert told[-1].startswith("fogml: none of 3 runs can be used; the first: ")
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_stranger_or_a_run_named_twice_is_refused(service, tmp_path, invoke):
     model, runs = service
     out = tmp_path / "out"

@@ -13,9 +13,9 @@ import pytest
 
 from experiments.faults.postgres import free_port, postgres, program, restart
 from fogml.errors import InputError
+from fogml.locks import sole_writer
 from fogml.monitor.record import RunRecord
 from fogml.monitor.store import FILE, open_store
-from fogml.outputs import sole_writer
 from tests.tuning.conftest import database  # noqa: F401
 
 RECORD = RunRecord(
@@ -151,6 +151,16 @@ def test_a_store_that_is_away_is_waited_for_and_then_said(tmp_path):
     with sole_writer(place / FILE), pytest.raises(InputError, match="is writing it"):
         store.add(others(1))
     assert len(store.records()) == 1
+
+
+def test_a_store_that_cannot_be_written_leaves_no_folder(tmp_path, monkeypatch):
+    def full(*words, **more):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pyarrow.parquet.write_table", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        open_store(str(tmp_path / "new" / "store"), 0.0).add([RECORD])
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_is_no_store_is_said_at_once(tmp_path):

@@ -17,7 +17,8 @@ import pytest
 
 from fogml import folders, outputs
 from fogml.errors import InputError
-from fogml.outputs import scratch_folder, settle, sole_writer, whole_file, whole_files, whole_folder
+from fogml.locks import sole_writer
+from fogml.outputs import folder_to_fill, scratch_folder, settle, whole_file, whole_files, whole_folder
 
 ROOT = Path(__file__).parents[2]
 
@@ -230,7 +231,7 @@ def test_the_lock_of_a_dead_process_is_taken_over(tmp_path, monkeypatch):
             assert json.loads(lock.read_text())["pid"] == os.getpid()
         assert not lock.exists()
     # On a file system without locks there is only what the file states.
-    monkeypatch.setattr("fogml.folders._locked", lambda handle, wait: False)
+    monkeypatch.setattr("fogml.locks._locked", lambda handle, wait: False)
     for text in ("", "garbage", json.dumps({**gone, "host": here})):
         lock.write_text(text)
         with sole_writer(out), pytest.raises(InputError, match=f"process {os.getpid()} on"), sole_writer(out):
@@ -239,6 +240,35 @@ def test_the_lock_of_a_dead_process_is_taken_over(tmp_path, monkeypatch):
     who = r"process 999999999 on elsewhere .* remove .*\.out\.lock"
     with pytest.raises(InputError, match=who), sole_writer(out):
         raise AssertionError
+
+
+def test_the_next_writer_in_a_folder_removes_the_locks_of_dead_processes_alone(tmp_path):
+    gone = {"pid": 999999999, "host": socket.gethostname(), "started": "1"}
+    texts = {
+        ".out+F-1.lock": gone,
+        ".far.lock": gone | {"host": "elsewhere"},
+        ".other.lock": [1],
+        "kept.lock": gone,
+    }
+    for name, told in texts.items():
+        (tmp_path / name).write_text(json.dumps(told))
+    with sole_writer(tmp_path / "mine"), whole_file(tmp_path / "run.csv") as partial:
+        partial.write_text("")
+        assert (tmp_path / ".mine.lock").exists()
+    assert {path.name for path in tmp_path.iterdir()} == {*texts, "run.csv"} - {".out+F-1.lock"}
+
+
+def test_a_folder_to_fill_is_gone_where_nothing_came_into_it(tmp_path):
+    (tmp_path / "here").mkdir()
+    for error in (OSError, KeyboardInterrupt):
+        with pytest.raises(error), folder_to_fill(tmp_path / "here" / "deep" / "er"):
+            raise error
+        assert not list((tmp_path / "here").iterdir())
+    with pytest.raises(OSError, match="full"), folder_to_fill(tmp_path / "here" / "deep" / "er"):
+        (tmp_path / "here" / "deep" / "kept").write_text("")
+        raise OSError("full")
+    assert tree(tmp_path) == {"here/deep/kept": ""}
+    assert not (tmp_path / "here" / "deep" / "er").exists()
 
 
 def test_messages_name_the_output_and_not_where_it_lies_meanwhile(tmp_path, monkeypatch):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.runs.profile_draft import draft_profile
 from fogml.runs.reading import read_run
 from tests.cli.conftest import run_program
 
@@ -46,6 +49,9 @@ READ = {
     "german.csv": "\ufeff" + semicolons(HEADER) + "\n" + "\n".join(map(semicolons, ROWS)) + "\n",
     "kreisel.csv": text("Zeit [s],Kreisel [°/h],Spulentemperatur [°C],T_out [°C]"),
     "chinese.csv": text("时间(s),陀螺仪输出(°/h),线圈温度(℃),T_out(℃)").encode("gb18030"),
+    "faces.csv": text("Zeit [s],Kreisel [°/h],Spulentemperatur innen [°C],Spulentemperatur außen [°C]"),
+    "faces2.csv": text("Time (s),Gyro (°/h),inner coil temperature (°C),coil temp outside (°C)"),
+    "faces3.csv": text("时间(s),陀螺(°/h),线圈内侧温度(℃),线圈外侧温度(℃)"),
     "merged.csv": text("Protokoll,,,\nZeit,,Temperaturen,\n,gyro,T_in,T_out\ns,deg/h,°C,°C"),
     "parens.csv": text("Time (s),Gyro (°/h),T_in (°C),T_out (°C)"),
     "stamps.csv": text(rows=map(moment, ROWS)),
@@ -121,6 +127,31 @@ def test_without_a_temperature_is_inspected_and_not_trained(tmp_path):
     told = run_program("train", path, "--test", path, "-o", tmp_path / "trained", status=2).stderr
     assert "no temperature 'T'" in told
     assert "the run holds none; call the column that measures it 'T [degC]', or let an import profile" in told
+
+
+@pytest.mark.parametrize(
+    ("inner", "outer"),
+    [
+        ("Temperatur innen", "Temperatur außen"),
+        ("Innentemperatur", "Aussentemperatur"),
+        ("inside temperature", "outside temp"),
+    ],
+)
+def test_inside_and_outside_of_whatever_is_asked_and_not_taken_for_the_coils_faces(tmp_path, inner, outer):
+    path = tmp_path / "run.csv"
+    path.write_text(text(f"time [s],gyro [deg/h],{inner} [°C],{outer} [°C]"))
+    run = read_run(path)
+    assert run.temperature_columns == ()
+    (finding,) = (f for f in run.findings if f.code == "unknown_column")
+    call = (
+        f"call '{inner}' 'T_in [degC]' and '{outer}' 'T_out [degC]' if measured on the coil's inner and outer"
+    )
+    assert call in finding.message and "'T_chamber [degC]' of the air" in finding.message
+    drafted = draft_profile(path)
+    for name, source in (("T_in", inner), ("T_out", outer)):
+        assert re.search(
+            rf'^  {name}: {{source: "{source} \[°C\]", unit: degC}} +# GUESS', drafted, re.MULTILINE
+        )
 
 
 @pytest.mark.parametrize("name", ["T_out", "T_chamber"])

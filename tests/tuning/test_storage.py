@@ -52,6 +52,7 @@ def test_half_a_line_is_dropped_by_the_next_writer(tmp_path):
     WholeLines(str(path)).append_logs([{"d": 4}])
     assert [json.loads(line) for line in path.read_text().splitlines()] == [{"a": 1}, {"b": 2}, {"d": 4}]
     assert list(journal.read_logs(2)) == [{"d": 4}]
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def _sweep_on_a_small_disk(settings, most, told):
