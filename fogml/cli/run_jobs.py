@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from fogml.cli.run_commands import ImportSettings, InspectSettings, NoiseSettings
 from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs, tell
 from fogml.cli.terminal import Terminal, number, span
 from fogml.errors import InputError
-from fogml.outputs import whole_file, whole_folder
+from fogml.outputs import scratch_folder, whole_file, whole_folder
 from fogml.readers import plain_path
 from fogml.report.words import duration
 from fogml.runs.columns import header
@@ -84,8 +83,8 @@ def _draft(settings: ImportSettings, terminal: Terminal) -> None:
     path = Path(settings.file)
     text = draft_profile(path)
     shown: list[dict[str, object]] = []
-    with TemporaryDirectory(prefix="fogml-draft-") as folder:
-        draft = Path(folder) / "profile.yaml"
+    with scratch_folder() as folder:
+        draft = folder / "profile.yaml"
         draft.write_text(text, encoding="utf-8")
         try:
             runs = import_recording(path, draft)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from fogml.export.plan import Plan
 from fogml.export.settings import SCHEMA, ExportSettings, report_tail
 from fogml.export.tables import by_axis, read_matrix
 from fogml.models.base import DriftModel
+from fogml.outputs import scratch_folder
 from fogml.runs.run import Run
 
 NAME = "fogml_axes"
@@ -87,16 +87,15 @@ def export_axes(
     reports, codes, sensors = {}, [], []
     for axis, model in named.items():
         runs = [run for run in train if run.facts.axis == axis]
-        with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
-            alone = Path(scratch)
+        with scratch_folder() as alone:
             reports[axis] = export_model(model, alone, settings, runs)
             (folder / f"{axis}-{DOCUMENTATION_FILE}").write_bytes((alone / DOCUMENTATION_FILE).read_bytes())
             inputs = Plan.of(model, settings.sample_s).sensors
             codes.append(_code_of(axis, alone, inputs))
         sensors += [name for name in inputs if name not in sensors]
     files = axes_source(codes, sensors, rows, fixed=fixed, dtype=settings.dtype)
-    with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
-        if run_self_test(files, f"{NAME}.h", f"{NAME}_self_test", f"{NAME}.c", Path(scratch)) != 0:
+    with scratch_folder() as scratch:
+        if run_self_test(files, f"{NAME}.h", f"{NAME}_self_test", f"{NAME}.c", scratch) != 0:
             raise InputError("export: the generated C of all axes fails its own self-test on this machine")
     write_files({**files, **project_files(NAME)}, folder)
     return {

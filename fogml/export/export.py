@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -42,6 +41,7 @@ from fogml.export.settings import (
 from fogml.export.sklearn_graph import export_graph, is_graph_alone
 from fogml.export.storage import stored_plan, weight_bytes
 from fogml.models.base import DriftModel
+from fogml.outputs import scratch_folder
 from fogml.runs.run import Run
 
 CLOCK = {"unit": "us", "bits": [64, 32], "wraps": True, "longest_uptime_s": None}
@@ -156,9 +156,9 @@ def _write_c(
         proven = fixed_point_error(plan, layout(plan, "fixed"), dtype)
         lines += fixed_point_lines(proven, plan)
     source = c_source(plan, dtype, lines)
-    with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
-        source = source.with_expected(*expected_outputs(source, Path(scratch)))
-        program = CProgram(source, Path(scratch))
+    with scratch_folder() as scratch:
+        source = source.with_expected(*expected_outputs(source, scratch))
+        program = CProgram(source, scratch)
         if program.self_test() != 0:
             raise InputError("export: the generated C fails its own self-test on this machine")
         difference = c_difference(plan, source, program, seed)
@@ -167,9 +167,9 @@ def _write_c(
             **project_files("fogml_model"),
             RUST_FILE: rust_bindings(source, program.state_bytes()),
         }
-        size = cortex_m4_size(source, Path(scratch))
+        size = cortex_m4_size(source, scratch)
         if size is not None:
-            size["instructions_per_sample"] = instructions_per_sample(source, Path(scratch))
+            size["instructions_per_sample"] = instructions_per_sample(source, scratch)
     write_files(files, folder)
     fixed = source.numbers["fixed"]
     report: dict[str, Any] = {"difference": difference, "cortex_m4": size, "clock": CLOCK}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from fogml.export.c_program import compiled_output, write_files
 from fogml.export.c_source import project_files, templates
 from fogml.export.segments import Segments
 from fogml.json_files import write_json
+from fogml.outputs import scratch_folder
 
 SCHEMA = "fogml.segments/1"
 CSV_FILE, JSON_FILE = "fogml_segments.csv", "fogml_segments.json"
@@ -166,8 +166,8 @@ def _difference(
     size = np.array([36000.0 / np.abs(table.scale).mean() for table in tables.values()])
     output = rng.uniform(-1.0, 1.0, temperature.shape) * size
     given = np.stack([temperature, output], axis=1).astype(dtype)
-    with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
-        told = compiled_output(files, DRIVER, Path(scratch), given.tobytes())
+    with scratch_folder() as scratch:
+        told = compiled_output(files, DRIVER, scratch, given.tobytes())
     out = np.frombuffer(told, dtype=dtype).reshape(temperature.shape).astype(np.float64)
     own = np.empty(temperature.shape)
     for i, table in enumerate(tables.values()):

@@ -6,6 +6,7 @@ mended counts, and a command that was interrupted is run again.
 
 from __future__ import annotations
 
+import errno
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +19,7 @@ import numpy as np
 
 from fogml.databases import engine_settings, parse_url, shown_url, told_by
 from fogml.errors import InputError
-from fogml.locks import sole_writer
+from fogml.locks import NO_ROOM, sole_writer
 from fogml.monitor.record import NUMBERS, TEXTS, RunRecord
 from fogml.outputs import folder_to_fill, whole_file
 
@@ -105,7 +106,9 @@ class FolderStore(Store):
                         self._write([*(held | other).values(), *new])
                     return len(new)
             except OSError as error:
-                raise _Away(
+                # A disk that takes no more takes none a little later.
+                kind = InputError if error.errno in (*NO_ROOM, errno.EACCES, errno.EPERM) else _Away
+                raise kind(
                     f"--store {self.folder}: cannot be written ({error.strerror or error}); nothing is lost: "
                     "run the command again once it can"
                 ) from None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import re
 import struct
-import tempfile
 from collections.abc import Iterator
 from functools import partial
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.outputs import scratch_folder
 from fogml.readers.columns import Container, Rows
 
 _HEADER, _HEADER_BYTES = b"\xa3\x95", 3  # of a DataFlash message, with its type before its fields
@@ -173,13 +173,12 @@ def _formats(definitions: bytes) -> dict[int, Any]:
     """The library's formats, units and multipliers by message type, from the messages that define these."""
     from pymavlink.DFReader import DFReader_binary
 
-    with tempfile.NamedTemporaryFile(prefix="fogml-") as file:
-        file.write(definitions)
-        file.flush()
+    with scratch_folder() as folder:
+        (folder / "log.bin").write_bytes(definitions)
         # What it prints of itself and of clocks that no message has is of no use here.
         reader = DFReader_binary.__new__(DFReader_binary)
         with contextlib.suppress(AttributeError):
-            reader.__init__(file.name, zero_time_base=True)
+            reader.__init__(str(folder / "log.bin"), zero_time_base=True)
         formats: dict[int, Any] = reader.formats
         with contextlib.suppress(BufferError):
             reader.close()

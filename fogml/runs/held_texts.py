@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 import weakref
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
 from fogml.errors import InputError, listed
+from fogml.outputs import scratch_folder
 from fogml.readers import reader_of_content
 from fogml.runs.csv_dialect import is_sure
 from fogml.runs.raw_table import RawTable, empty_file
@@ -40,9 +40,9 @@ class HeldText:
     """
 
     def __init__(self, path: Path, kind: str, limits: ReadingLimits) -> None:
-        folder = tempfile.mkdtemp(prefix="fogml-text-")
-        away = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        self.path = Path(folder) / path.name
+        held = ExitStack()
+        away = weakref.finalize(self, held.close)
+        self.path = held.enter_context(scratch_folder()) / path.name
         try:
             self._unpack(path, kind, limits)
         except BaseException:

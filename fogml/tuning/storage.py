@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from fogml.databases import engine_settings, parse_url, shown_url, told_by
 from fogml.errors import InputError
+from fogml.outputs import folder_to_fill
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -61,6 +62,22 @@ def import_optuna() -> Any:
         raise InputError("a sweep needs Optuna: pip install -e '.[sweep]' in fogml's source") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     return optuna
+
+
+@contextmanager
+def journal_to_fill(url: str | None, folder: str | Path) -> Iterator[None]:
+    """Let no empty journal, nor the folder made for it, stay where the block fails."""
+    if url is not None:
+        yield
+        return
+    with folder_to_fill(folder):
+        try:
+            yield
+        except BaseException:
+            path = Path(folder) / JOURNAL
+            if path.is_file() and path.stat().st_size == 0:
+                path.unlink()
+            raise
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from fogml.json_files import finite_json
 from fogml.processes import begin_worker, one_thread
 from fogml.tuning.held_out import HeldOut
 from fogml.tuning.plan import OBJECTIVES, Plan
-from fogml.tuning.storage import shown, storage_errors
+from fogml.tuning.storage import journal_to_fill, shown, storage_errors
 from fogml.tuning.study import Recovery, finished_count, is_finished, open_study, place_of
 from fogml.tuning.winner import (
     against_references,
@@ -141,7 +141,7 @@ def run_sweep(plan: Plan, workers: int = 1, progress: Progress | None = None) ->
     if plan.references is None:
         plan = replace(plan, references=reference_choices(plan.read(), plan.seed))
     held_out = _held_out(plan)
-    with storage_errors(plan.storage):
+    with storage_errors(plan.storage), journal_to_fill(plan.storage, plan.folder):
         study = open_study(plan, held_out.runs)
         Recovery(plan.heartbeat_s)(study)
         if workers == 1:

@@ -159,7 +159,7 @@ def test_a_store_that_cannot_be_written_leaves_no_folder(tmp_path, monkeypatch):
 
     monkeypatch.setattr("pyarrow.parquet.write_table", full)
     with pytest.raises(InputError, match="No space left on device"):
-        open_store(str(tmp_path / "new" / "store"), 0.0).add([RECORD])
+        open_store(str(tmp_path / "new" / "store"), 60.0).add([RECORD])  # it is not waited for
     assert not list(tmp_path.iterdir())
 
 

@@ -83,6 +83,16 @@ def test_a_disk_that_fills_in_the_middle_keeps_the_finished_trials(tmp_path):
     assert sum(is_finished(trial) for trial in ended.get_trials()) == 6
 
 
+def test_a_journal_that_took_nothing_does_not_stay(tmp_path, monkeypatch):
+    def full(file, data):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("fogml.tuning.journal._write_all", full)
+    with pytest.raises(InputError, match=r"study\.journal: cannot be written"):
+        run_sweep(plan(tmp_path / "new" / "out", trials=3))
+    assert not list(tmp_path.glob("new*"))
+
+
 def test_the_database_gets_the_password_that_is_shown_to_nobody(monkeypatch):
     asked = []
 
