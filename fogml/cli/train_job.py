@@ -22,6 +22,7 @@ from fogml.validation.limits import check_design_index, check_limits, hold_stric
 from fogml.validation.metrics import check_turn_on_band
 from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement, RunJudgement
+from fogml.validation.thermometer_lag import lag_note
 
 if TYPE_CHECKING:
     from fogml.cli.compare_job import CompareSettings
@@ -148,6 +149,8 @@ def fit_and_judge(
         )
         beside = {name: judging(other, beside=[model]).test for name, other in others.items()}
         judgement = replace(judgement, beside=beside)
+        if "lag(" not in (settings.features or "") and (lag := lag_note(train_runs, test_runs)) is not None:
+            judgement = replace(judgement, notes=(*judgement.notes, lag))
     if settings.strict:
         hold_strict([(run.run, run.findings) for run in judgement.test])
     return model, judgement
