@@ -206,6 +206,6 @@ def _solved(noise: RunsNoise, table: TrainingTable, columns: FloatArray) -> tupl
     triangles = noise.triangles(table, np.column_stack((np.ones(len(table)), columns)))
     # Without the first row of each triangle the run's constant is free.
     parts = np.concatenate([triangle[1:, 1:] for triangle in triangles])
-    corner = np.linalg.qr(parts, mode="r")
+    corner: FloatArray = np.asarray(np.linalg.qr(parts, mode="r"))
     inverse = np.linalg.pinv(corner[:-1, :-1], rcond=1e-12)
     return inverse @ corner[:-1, -1], np.linalg.norm(inverse, axis=1)
