@@ -168,6 +168,37 @@ def interval_folds(table: TrainingTable, guard_s: float = 0.0) -> tuple[list[Fol
     return time_folds(table, guard_s=guard_s), "time blocks"
 
 
+def of_usual_averages(
+    found: Intervals,
+    rows: Sequence[RunRows],
+    table: TrainingTable,
+    predicted: Callable[[FloatArray], FloatArray],
+) -> Intervals:
+    """Half-widths told by long averages, for the usual ones of `interval_table`.
+
+    What shorter averages leave beyond the long ones is noise that has averaged out in these: its variance is
+    added, both as normal errors.
+
+    Parameters
+    ----------
+    found
+        Of averages of `table`.
+    rows
+        What the table was made of.
+    table
+        Averages of atoms.
+    predicted
+        The model's prediction [deg/h] from atoms.
+    """
+    usual = interval_table(rows)
+    if not usual.averaging_s < found.averaging_s:
+        return found
+    more = float(np.var(usual.y - predicted(usual.X)) - np.var(table.y - predicted(table.X)))
+    normal = np.array([normal_ppf(0.5 + level / 2.0) for level in found.levels])
+    half = np.hypot(found.half_widths, normal * np.sqrt(max(more, 0.0)))
+    return replace(found, averaging_s=usual.averaging_s, half_widths=tuple(half.tolist()))
+
+
 def out_of_fold_intervals(
     table: TrainingTable,
     predicted: Callable[[TrainingTable, TrainingTable], FloatArray],

@@ -24,7 +24,7 @@ from fogml.models.combination import (
     temperatures_of,
 )
 from fogml.models.feature_model import FeatureModel, resolve_features
-from fogml.models.intervals import Intervals
+from fogml.models.intervals import Intervals, of_usual_averages
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import SizePriors, fit_mixed_effects
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
@@ -91,7 +91,11 @@ class MixedEffectsModel(FeatureModel):
         mean = float(table.y.mean())
         _, self.regressor_ = combined([(features, shared)], weights, mean)
         errors = errors_of_all([member], features, table)
-        self._found = intervals_of(parts, weights, table, self._both_ways, errors)
+        found = intervals_of(parts, weights, table, self._both_ways, errors)
+        linear = self.regressor_
+        self._found = of_usual_averages(
+            found, rows, table, lambda atoms: linear.predict_unchecked(features.compose(atoms))
+        )
         return len(table)
 
     def _size_priors(self, table: TrainingTable) -> SizePriors:

@@ -30,6 +30,7 @@ from fogml.models.combination import (
     temperatures_of,
 )
 from fogml.models.feature_model import FeatureModel, resolve_features
+from fogml.models.intervals import of_usual_averages
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import fit_mixed_effects, linear_regressor
 from fogml.models.mixed_effects_model import averages_of, composed, offered, static_features
@@ -144,6 +145,9 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
     model = FeatureModel(own.text, kind="combination")
     places = [union.atoms.index(atom) for atom in own.atoms]
     learn_box(own, [part.atoms[:, places] for part in rows])
+    intervals = of_usual_averages(
+        intervals, rows, table, lambda atoms: linear.predict_unchecked(own.compose(atoms[:, places]))
+    )
     model.features_, model.regressor_, model.intervals_ = own, linear, intervals
     notes = [note for part in rows for note in part.notes]
     model.card_ = training_card(runs, hashes=hashes, rows=len(table), features=own, notes=notes)

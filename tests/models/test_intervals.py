@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from statistics import NormalDist
+
 import numpy as np
 import pytest
 
 from fogml.errors import InputError
 from fogml.models.feature_model import FeatureModel
-from fogml.models.intervals import LEVELS, half_widths_of_runs, intervals_from_residuals, saved_intervals
+from fogml.models.intervals import (
+    LEVELS,
+    Intervals,
+    half_widths_of_runs,
+    intervals_from_residuals,
+    of_usual_averages,
+    saved_intervals,
+)
+from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.names import make_model
+from fogml.models.table import RunRows, averaged_table
+from fogml.runs.run import Run
 from fogml.strict import as_written
 from fogml.testing.models import synthetic_run
 
@@ -92,3 +104,41 @@ def test_nine_runs_are_just_enough_for_nine_tenths():
     half = half_widths_of_runs([np.full(20, float(k)) for k in range(1, 10)])
     assert half[LEVELS.index(0.9)] == 9.0 and half[LEVELS.index(0.5)] == 5.0
     assert half[LEVELS.index(0.95)] > 9.0
+
+
+def test_half_widths_of_long_averages_are_brought_to_the_usual_ones() -> None:
+    """White noise: of averages over 400 s and over 100 s, by the closed form."""
+    rng, sigma = np.random.default_rng(3), 0.5
+    time = 10.0 * np.arange(40_000)
+    rows = [RunRows(np.zeros((len(time), 1)), sigma * rng.standard_normal(len(time)), time)]
+    table = averaged_table(rows, lambda atoms: atoms, 400.0)
+    normal = NormalDist()
+    z = np.array([normal.inv_cdf(0.5 + level / 2.0) for level in LEVELS])
+    long = Intervals(400.0, tuple((z * sigma / np.sqrt(40.0)).tolist()), len(table), "runs")
+    usual = of_usual_averages(long, rows, table, lambda atoms: np.zeros(len(atoms)))
+    assert usual.averaging_s == 100.0
+    np.testing.assert_allclose(usual.half_widths, z * sigma / np.sqrt(10.0), rtol=0.02)
+    assert of_usual_averages(usual, rows, table, lambda atoms: np.zeros(len(atoms))) == usual
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+def test_an_interval_of_many_hours_holds_averages_of_the_judgement(runs: int) -> None:
+    """What it states is of 100 s averages however long the training is: no false doubt of a right model."""
+    rng = np.random.default_rng(5)
+
+    def recorded(rate: float) -> Run:
+        legs = [25.0, 60.0, 60.0, -40.0, -40.0, 25.0]
+        hours = np.cumsum([0.0, 35.0 / rate, 60.0, 100.0 / rate, 60.0, 65.0 / rate]) / 60.0
+        time = np.arange(0.0, 3600.0 * hours[-1], 20.0)
+        T = np.interp(time / 3600.0, hours, legs)
+        gyro = 0.02 * (T - 25.0) + 0.3 * np.gradient(T, time) * 60.0 + 0.1 * rng.standard_normal(len(time))
+        return Run("own", {"time": time, "gyro": gyro, "T": T})
+
+    model = MixedEffectsModel().fit([recorded(0.5) for _ in range(runs)])
+    test = recorded(0.6)
+    left = test.gyro_deg_h - model.predict(test)
+    count = len(left) // 5 * 5
+    averages = left[:count].reshape(-1, 5).mean(axis=1)
+    half = float(model.intervals_.half_width(0.9))
+    assert model.intervals_.averaging_s == 100.0
+    assert 0.85 < np.mean(np.abs(averages - averages.mean()) < half) < 0.995
