@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 
+from fogml.outputs import scratch_folder
+
 _CHILD = Path(__file__).with_name("limited_child.py")
 
 
@@ -61,11 +63,22 @@ def run_limited(words: Sequence[str], limits: ProgramLimits, data: bytes = b"") 
     memory = -1 if limits.memory_bytes is None else limits.memory_bytes
     stated = (limits.cpu_s, memory, limits.output_bytes)
     launcher = [sys.executable, "-I", "-S", str(_CHILD), *map(str, stated), *words]
-    with TemporaryFile() as given, TemporaryFile() as output, TemporaryFile() as errors:
+    with (
+        TemporaryFile() as given,
+        TemporaryFile() as output,
+        TemporaryFile() as errors,
+        scratch_folder() as scratch,
+    ):
         given.write(data)
         given.seek(0)
         process = subprocess.Popen(
-            launcher, stdin=given, stdout=output, stderr=errors, start_new_session=True
+            launcher,
+            stdin=given,
+            stdout=output,
+            stderr=errors,
+            start_new_session=True,
+            # A compiler that is ended leaves its temporary files.
+            env={**os.environ, "TMPDIR": str(scratch)},
         )
         try:
             status = process.wait(limits.wall_s)

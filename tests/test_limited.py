@@ -61,3 +61,11 @@ def test_what_a_program_started_ends_with_it(tmp_path):
             return
         time.sleep(0.05)
     raise AssertionError("the program's child lives on")
+
+
+def test_what_a_program_leaves_among_temporary_files_goes_with_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    code = "import os, time; open(os.environ['TMPDIR'] + '/left.s', 'w'); time.sleep(60)"
+    with pytest.raises(LimitExceededError):
+        run_limited([*PYTHON, code], ProgramLimits(wall_s=0.5))
+    assert not list(tmp_path.iterdir())

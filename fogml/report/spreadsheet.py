@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fogml.escaping import cell_text, visible
-from fogml.outputs import whole_file
+from fogml.outputs import scratch_folder, whole_file
 from fogml.report.tables import coefficients_of, noticed, repeatability_table
 from fogml.report.verdict import advice_words, model_card, stated_limits, subject, verdict
 from fogml.report.words import label, unit_of
@@ -85,9 +85,10 @@ def whole_workbook(path: str | Path) -> Iterator[Writer]:
     import xlsxwriter
     from xlsxwriter.exceptions import FileCreateError
 
-    with whole_file(path) as partial:
+    # The library's own temporary files would stay where its process is killed.
+    with whole_file(path) as partial, scratch_folder() as scratch:
         try:
-            with xlsxwriter.Workbook(str(partial), SAFE_TEXT) as workbook:
+            with xlsxwriter.Workbook(str(partial), {**SAFE_TEXT, "tmpdir": str(scratch)}) as workbook:
                 workbook.set_properties({"created": _NO_DATE})
                 yield Writer(workbook)
         except FileCreateError as error:

@@ -104,3 +104,15 @@ def test_the_same_results_are_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "one.xlsx").read_bytes() == (tmp_path / "two.xlsx").read_bytes()
     with zipfile.ZipFile(tmp_path / "one.xlsx") as archive:
         assert set(re.findall(rb"20\d\d-\d\d-\d\dT", archive.read("docProps/core.xml"))) == set()
+
+
+def test_an_interrupt_leaves_no_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(packager: Any) -> None:
+        raise KeyboardInterrupt
+
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
+    monkeypatch.setattr("xlsxwriter.packager.Packager._write_root_rels_file", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        spreadsheet(judgement(1), tmp_path / "report.xlsx")
+    assert not list((tmp_path / "tmp").iterdir()) and not list(tmp_path.glob("*.xlsx"))
