@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,86 +78,155 @@ class _Unknown:
         return spread * error * (self.value(unknown) if log else 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Optimum:
-    """An amplitude and a shape with standard errors, how well they fit [nats], and what they make."""
+@dataclass(frozen=True)
+class Fitted:
+    """An effect's amplitude and shape with standard errors."""
 
     amplitude: float
     amplitude_se: float
     shape: Mapping[str, float]
     shape_se: Mapping[str, float]
-    fit: float
-    made: FloatArray
 
 
 class Form:
-    """What an effect driven by the temperature of a place makes, whitened beside all else, against the data.
+    """What an effect makes of the fit runs, whitened, about an amplitude and a shape to begin with.
 
     Unknowns are its amplitude over the usual most, whose prior is as wide as the greatest possible, angles,
     and other parameters by the priors that units are drawn from: a usual range is the central 90 % of a
     log-normal law, or of a normal one where it reaches zero.
+
+    Parameters
+    ----------
+    declared, field
+        The effect; runs, and what is whitened.
+    amplitude, shape
+        Where it begins.
+    place
+        Name of the place that drives it; None for the temperatures that a replay has.
     """
 
-    def __init__(self, declared: Effect, field: Field, beside: LinearGaussian, place: str) -> None:
+    def __init__(
+        self,
+        declared: Effect,
+        field: Field,
+        amplitude: float,
+        shape: Mapping[str, float],
+        place: str | None = None,
+    ) -> None:
         scene = field.setting.scene
-        self.declared, self.field = declared, field
-        self.driving = [driving_of(declared, rows, scene, place) for rows in scene.fit]
+        self.declared, self.field, self.shape = declared, field, shape
+        self.driving = [
+            None if place is None else driving_of(declared, rows, scene, place) for rows in scene.fit
+        ]
         unknowns = [_Unknown(q, scene.grade) for q in declared.shape if not is_whole(q, scene.grids)]
         self.free = [one for one in unknowns if one.free]
         self.usual = declared.amplitude.range(scene.grade)[1]
-        self.greatest = max(map(abs, declared.amplitude.limits))
-        # A root of I - Q Q', Q the basis of all else, by the eigenvectors of Q' Q.
+        greatest = max(map(abs, declared.amplitude.limits))
+        self.weights = np.array([self.usual / greatest, *(u.weight for u in self.free)])
+        self.limits = np.array([declared.amplitude.limits, *(u.limits for u in self.free)])
+        self.limits[0] /= self.usual
+        first = [amplitude / self.usual, *(u.unknown(shape[u.quantity.name]) for u in self.free)]
+        self.first = np.clip(first, self.limits[:, 0] + 1e-9, self.limits[:, 1] - 1e-9)
+
+    def made(self, unknowns: FloatArray) -> FloatArray:
+        """Whitened, shape (n,)."""
+        return np.asarray(unknowns[0] * self._usual(unknowns))
+
+    def slopes(self, unknowns: FloatArray) -> FloatArray:
+        """Of what is made, shape (n, unknowns), by central differences where it is not in proportion."""
+        columns = [self._usual(unknowns)]
+        for move in _MOVE * np.eye(len(unknowns))[1:]:
+            both = self._usual(unknowns + move) - self._usual(unknowns - move)
+            columns.append(unknowns[0] * both / (2.0 * _MOVE))
+        return np.column_stack(columns)
+
+    def told(self, unknowns: FloatArray, errors: FloatArray) -> Fitted:
+        """What unknowns stand for."""
+        at = self._shape(unknowns)
+        shape = {q.name: at[q.name] for q in self.declared.shape}
+        shape_se = dict.fromkeys(shape, 0.0)
+        for u, x, error in zip(self.free, unknowns[1:].tolist(), errors[1:].tolist()):
+            shape_se[u.quantity.name] = u.error(x, error)
+        return Fitted(self.usual * float(unknowns[0]), self.usual * float(errors[0]), shape, shape_se)
+
+    def _shape(self, unknowns: FloatArray) -> dict[str, float]:
+        own = {u.quantity.name: u.value(x) for u, x in zip(self.free, unknowns[1:].tolist())}
+        return {**self.shape, **own}
+
+    def _usual(self, unknowns: FloatArray) -> FloatArray:
+        """At the usual most."""
+        runs, values, shape = self.field.setting.scene.fit, self.field.setting.values, self._shape(unknowns)
+        by_run = [r.response(self.declared, shape, t, values) for r, t in zip(runs, self.driving)]
+        return self.usual * self.field.whitening.stacked(by_run)
+
+
+class Root:
+    """A root of I - Q Q', Q the basis of all that the data are beside, by the eigenvectors of Q' Q."""
+
+    def __init__(self, beside: LinearGaussian) -> None:
         values, vectors = np.linalg.eigh(beside.basis.T @ beside.basis)
         shown = values > 1e-12
         self._basis = beside.basis @ (vectors[:, shown] / np.sqrt(values[shown]))
         self._taken = 1.0 - np.sqrt(np.maximum(1.0 - values[shown], 0.0))
-        self.data = self._beside(beside.data)
+        self.data = self.of(beside.data)
 
-    def optimum(self, amplitude: float, shape: Mapping[str, float]) -> Optimum:
-        """The least squares that are reached from an amplitude and a shape."""
-        from scipy.optimize import least_squares
+    def of(self, columns: FloatArray) -> FloatArray:
+        """Columns beside all else, shape (n, ...)."""
+        taken = self._taken[:, None] if columns.ndim > 1 else self._taken
+        return np.asarray(columns - self._basis @ (taken * (self._basis.T @ columns)))
 
-        def shape_at(unknowns: FloatArray) -> dict[str, float]:
-            own = {u.quantity.name: u.value(x) for u, x in zip(self.free, unknowns[1:].tolist())}
-            return {**shape, **own}
 
-        def made(unknowns: FloatArray) -> FloatArray:
-            return self.usual * self._response(shape_at(unknowns))
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Effects that fit best.
 
-        def missed(unknowns: FloatArray) -> FloatArray:
-            return np.concatenate([self.data - unknowns[0] * made(unknowns), weights * unknowns])
+    Attributes
+    ----------
+    effects
+        Their amplitudes and shapes.
+    fit
+        How well they fit [nats].
+    made
+        What they make beside all else, shape (n,).
+    unknowns, covariance
+        Of each; of all together.
+    """
 
-        def slopes(unknowns: FloatArray) -> FloatArray:
-            columns = [made(unknowns)]
-            for move in _MOVE * np.eye(len(unknowns))[1:]:
-                both = made(unknowns + move) - made(unknowns - move)
-                columns.append(unknowns[0] * both / (2.0 * _MOVE))
-            return np.concatenate([-np.column_stack(columns), np.diag(weights)])
+    effects: tuple[Fitted, ...]
+    fit: float
+    made: FloatArray
+    unknowns: tuple[FloatArray, ...]
+    covariance: FloatArray
 
-        weights = np.array([self.usual / self.greatest, *(u.weight for u in self.free)])
-        limits = np.array([self.declared.amplitude.limits, *(u.limits for u in self.free)]).T
-        limits[:, 0] /= self.usual
-        first = np.array([amplitude / self.usual, *(u.unknown(shape[u.quantity.name]) for u in self.free)])
-        first = np.clip(first, limits[0] + 1e-9, limits[1] - 1e-9)
-        found = least_squares(missed, first, slopes, limits, x_scale="jac", ftol=1e-6)
-        length = np.linalg.norm(found.jac, axis=0)
-        scale = np.where(length > 0.0, length, 1.0)
-        covariance = np.linalg.pinv(found.jac.T @ found.jac / np.outer(scale, scale), hermitian=True)
-        errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)) / scale
-        errors[length == 0.0] = math.inf  # a direction that makes no difference
-        told = {q.name: shape_at(found.x)[q.name] for q in self.declared.shape}
-        shape_se = dict.fromkeys(told, 0.0)
-        for u, x, error in zip(self.free, found.x[1:].tolist(), errors[1:].tolist()):
-            shape_se[u.quantity.name] = u.error(x, error)
-        size, size_se = self.usual * found.x[0], self.usual * errors[0]
-        fitted = self.data - found.fun[: len(self.data)]
-        return Optimum(float(size), float(size_se), told, shape_se, -float(found.cost), fitted)
 
-    def _response(self, shape: Mapping[str, float]) -> FloatArray:
-        """Of an amplitude of 1, beside all else."""
-        runs, values = self.field.setting.scene.fit, self.field.setting.values
-        by_run = [r.response(self.declared, shape, t, values) for r, t in zip(runs, self.driving)]
-        return self._beside(self.field.whitening.stacked(by_run))
+def optimum(forms: Sequence[Form], root: Root) -> Optimum:
+    """The least squares that forms reach together, from where they begin."""
+    from scipy.optimize import least_squares
 
-    def _beside(self, series: FloatArray) -> FloatArray:
-        return np.asarray(series - self._basis @ (self._taken * (self._basis.T @ series)))
+    ends = np.cumsum([len(form.first) for form in forms])[:-1]
+    weights = np.concatenate([form.weights for form in forms])
+
+    def parts(unknowns: FloatArray) -> list[FloatArray]:
+        return np.split(unknowns, ends)
+
+    def missed(unknowns: FloatArray) -> FloatArray:
+        made = np.sum([form.made(own) for form, own in zip(forms, parts(unknowns))], axis=0)
+        return np.concatenate([root.data - root.of(made), weights * unknowns])
+
+    def slopes(unknowns: FloatArray) -> FloatArray:
+        columns = [form.slopes(own) for form, own in zip(forms, parts(unknowns))]
+        return np.concatenate([-root.of(np.concatenate(columns, axis=1)), np.diag(weights)])
+
+    first = np.concatenate([form.first for form in forms])
+    limits = np.concatenate([form.limits for form in forms]).T
+    found = least_squares(missed, first, slopes, limits, x_scale="jac", ftol=1e-6)
+    length = np.linalg.norm(found.jac, axis=0)
+    scale = np.where(length > 0.0, length, 1.0)
+    scales = np.outer(scale, scale)
+    covariance = np.linalg.pinv(found.jac.T @ found.jac / scales, hermitian=True) / scales
+    errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    errors[length == 0.0] = math.inf  # a direction that makes no difference
+    own = tuple(parts(found.x))
+    effects = tuple(form.told(x, se) for form, x, se in zip(forms, own, parts(errors)))
+    made = root.data - found.fun[: len(root.data)]
+    return Optimum(effects, -float(found.cost), made, own, covariance)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.gap.card_form import Form, Optimum
+from fogml.gap.card_form import Fitted, Form, Optimum, Root, optimum
 from fogml.gap.catalogue import nodes_of, signature_of
 from fogml.gap.field import Field, Member, apart
 from fogml.gap.inference import Inference
@@ -40,7 +40,7 @@ def cards_of(found: Inference, judged: Judgement) -> dict[str, Card]:
     cards = {}
     for cause in judged.causes:
         beside = beside_others(found, judged.best.members, cause)
-        cards[cause.ids[0]] = card_of(cause.ids[0], found.field, beside, _told(found, cause))
+        cards[cause.ids[0]] = card_of(cause.ids[0], found.field, beside, told_by_family(found, cause))
     return cards
 
 
@@ -49,9 +49,18 @@ def beside_others(found: Inference, members: Sequence[Member], cause: Cause) -> 
     return found.field.beside(m for m in members if m not in cause.members)
 
 
-def _told(found: Inference, cause: Cause) -> Mapping[str, Any]:
+def told_by_family(found: Inference, cause: Cause) -> Mapping[str, Any]:
     """Shape that a cause's family tells, such as a period."""
     return found.columns.nodes[cause.member.node].shape
+
+
+def in_form(declared: Effect) -> bool:
+    """Whether an amplitude is fitted, the same on all runs: no spread over them, no step read off."""
+    return not (_spreads(declared) or getattr(declared, "digitises", False))
+
+
+def _spreads(declared: Effect) -> bool:
+    return declared.drawn_per_run or declared.family in ("line", "power_cycles")
 
 
 def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, Any]) -> Card:
@@ -75,22 +84,24 @@ def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, An
     """
     setting, scene = field.setting, field.setting.scene
     declared = scene.candidates[id]
-    if declared.drawn_per_run or declared.family in ("line", "power_cycles"):
+    if _spreads(declared):
         return _drawn(declared, told, field, beside)
     angles = [q.name for q in declared.shape if is_angle(q)]
     optima: list[Optimum] = []
+    root = Root(beside)
     for place, amplitude, shape in _starts(declared, field, beside, told):
-        optimum = Form(declared, field, beside, place).optimum(amplitude, shape)
+        found = optimum([Form(declared, field, amplitude, shape, place)], root)
         # Two that make the same of the runs, to less than noise, are one.
-        if all(float(np.linalg.norm(optimum.made - other.made)) > 1.0 for other in optima):
-            optima.append(optimum)
+        if all(float(np.linalg.norm(found.made - other.made)) > 1.0 for other in optima):
+            optima.append(found)
     _, usual = declared.amplitude.range(scene.grade)
-    sizes = np.array([optimum.amplitude for optimum in optima])
-    fits = np.array([optimum.fit for optimum in optima]) + setting.priors.log_usual(np.abs(sizes) / usual)
-    best = optima[int(np.argmax(fits))]
+    every = [found.effects[0] for found in optima]
+    sizes = np.array([one.amplitude for one in every])
+    fits = np.array([found.fit for found in optima]) + setting.priors.log_usual(np.abs(sizes) / usual)
+    best = every[int(np.argmax(fits))]
     weights = np.exp(fits - fits.max())
     weights /= weights.sum()
-    values = [_facing(best, optimum, angles) for optimum in optima]
+    values = [_facing(best, one, angles) for one in every]
     amplitude, form_se = best.amplitude, setting.priors.form_error * best.amplitude
     off = np.array([size - amplitude for size, _ in values])
     se = math.sqrt(best.amplitude_se**2 + float(weights @ off**2) + form_se**2)
@@ -154,8 +165,8 @@ def _opposite(
     return -amplitude, {**shape, **{name: shape[name] + 180.0 for name in angles}}
 
 
-def _facing(best: Optimum, other: Optimum, angles: Sequence[str]) -> tuple[float, Mapping[str, float]]:
-    """Amplitude and shape of an optimum, in the sign of another where there is a direction."""
+def _facing(best: Fitted, other: Fitted, angles: Sequence[str]) -> tuple[float, Mapping[str, float]]:
+    """Amplitude and shape of a fit, in the sign of another where there is a direction."""
     opposed = bool(angles) and other.amplitude * best.amplitude < 0.0
     told = other.amplitude, other.shape
     return _opposite(*told, angles) if opposed else told
@@ -205,22 +216,3 @@ def _drawn(declared: Effect, told: Mapping[str, Any], field: Field, beside: Line
     se = math.hypot(noise, size / math.sqrt(2.0 * max(len(runs) - 1, 1)))
     amplitude = float(np.clip(size, *declared.amplitude.limits))
     return Card(EffectValue(declared.id, amplitude, dict(shape)), se, {})
-
-
-def fitted_values(
-    found: Inference, judged: Judgement, named: Sequence[Cause], cards: Mapping[str, Card]
-) -> tuple[EffectValue, ...]:
-    """What the model with the named causes has of each: of an effect that it had already, all of it."""
-    had = {declared.id: (declared, setting) for declared, setting in found.plant.on}
-    values = []
-    for cause in named:
-        id = cause.ids[0]
-        if id not in had:
-            values.append(cards[id].value)
-            continue
-        declared, setting = had[id]
-        held = beside_others(found, judged.best.members, cause)
-        more = setting.amplitude * found.field.response(declared, setting.shape)
-        whole = replace(held, data=held.data + more)
-        values.append(card_of(id, found.field, whole, _told(found, cause)).value)
-    return tuple(values)

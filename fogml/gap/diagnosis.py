@@ -9,9 +9,10 @@ import numpy as np
 
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals, joint_uncertainty
-from fogml.gap.cards import cards_of, fitted_values
+from fogml.gap.cards import cards_of
 from fogml.gap.causes import energy, found_cause
 from fogml.gap.compensation import compensation_of
+from fogml.gap.fitted_model import fitted_model
 from fogml.gap.how_far import Foretold, HeldOut, cause_shares
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
 from fogml.gap.model import AnyModel, TwinModel
@@ -21,7 +22,6 @@ from fogml.gap.posterior import Cause, Judgement, at_cost, doubted, judge
 from fogml.gap.reports import (
     assumed,
     candidate_evidence,
-    constants_of,
     headline,
     looks_like,
     noise_of,
@@ -184,12 +184,10 @@ def _answer(
     scene, settings, likeliest = found.scene, found.setting.priors.reported, judged.best.members
     shifted = [at_cost(c.probability, cost) for c in judged.causes]
     named = [c for c, p in zip(judged.causes, shifted) if p >= NAMED]
-    recalibrated = Foretold.of(found, (), ())
-    every = Foretold.of(found, likeliest, likeliest)
-    counted = [m for c in named for m in c.members]
-    # Beside what is unknown, but not beside causes that nobody would add: two that cancel foretell nothing.
-    beside = [m for m in likeliest if found.kind(m) != "known"]
-    after = Foretold.of(found, [*counted, *beside], counted) if named else recalibrated
+    recalibrated = Foretold.of(found, ())
+    every = Foretold.of(found, likeliest)
+    # Beside nothing that nobody would add: two that cancel foretell nothing, one of them left out.
+    after = Foretold.of(found, [m for c in named for m in c.members])
     shares = cause_shares(found, judged, every, recalibrated, seed)
     share = {s.effect: s.share for s in shares if s.run is None and s.regime is None}
     cards = cards_of(found, judged)
@@ -214,7 +212,7 @@ def _answer(
     unknown = doubted(Unknown(judged.unknown, looks_like(found, judged)), items)
     verdict = _verdict(named, unknown, judged.nothing < settings.surely_not_nothing)
     shown = () if verdict == "unknown" else items
-    values = fitted_values(found, judged, named, cards)
+    values, constants = fitted_model(found, judged, named, cards)
     return Diagnosis(
         fit=tuple(r.run.name for r in scene.fit),
         held_out=tuple(r.run.name for r in scene.runs[scene.fitted :]),
@@ -228,7 +226,7 @@ def _answer(
         how_far=far,
         undetectable=tuple(e.effect for e in evidence if e.status in ("undetectable", "in_constants")),
         separating_run=None,
-        constants=constants_of(found, after),
+        constants=constants,
         evidence=evidence,
         noise=noise_of(found, after),
         effects=values,
@@ -276,7 +274,7 @@ def _what_if(found: Inference, named: Sequence[Cause], held_out: Sequence[HeldOu
             if family.kind != "known" or family.id in ids:
                 continue
             both = [*others, member]
-            foretold = Foretold.of(found, both, both)
+            foretold = Foretold.of(found, both)
             share = _closed_share(found, foretold)
             for run in held_out:
                 told = run.how_far(foretold)

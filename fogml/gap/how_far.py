@@ -35,23 +35,17 @@ class Foretold:
         Causes that are fitted.
     posterior
         Of coefficients: fixed block first, then each member's.
-    counted
-        Which of them take part in what is foretold, shape (q,).
     """
 
     found: Inference
     members: tuple[Member, ...]
     posterior: Posterior
-    counted: FloatArray
 
     @classmethod
-    def of(cls, found: Inference, members: Sequence[Member], counted: Sequence[Member]) -> Foretold:
-        """Members fitted, and those among them that count."""
-        held = found.field
-        posterior = Posterior.of(held.design(members), held.base.data)
-        kept = [np.ones(held.fixed.shape[1])]
-        kept += [np.full(held.block(m.node).shape[1], float(m in counted)) for m in members]
-        return cls(found, tuple(members), posterior, np.concatenate(kept))
+    def of(cls, found: Inference, members: Sequence[Member]) -> Foretold:
+        """Constants and members fitted together."""
+        posterior = Posterior.of(found.field.design(members), found.field.base.data)
+        return cls(found, tuple(members), posterior)
 
     def design(self, run: int) -> FloatArray:
         """Responses of the coefficients on a run of the scene, shape (m, q) [deg/h]."""
@@ -62,7 +56,7 @@ class Foretold:
             parts.append(
                 m.size * held.scale[m.node] * self.found.columns.by_run[run][:, node.start : node.stop]
             )
-        return np.concatenate(parts, axis=1) * self.counted
+        return np.concatenate(parts, axis=1)
 
     def on(self, run: int) -> FloatArray:
         """What is foretold [deg/h], shape (m,)."""

@@ -6,7 +6,7 @@ effects, each linear in its amplitude at given shape parameters.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -226,7 +226,7 @@ AnyModel = TwinModel | GyroModel
 """What can be diagnosed: the twin, whose own inputs the families know, or another model in its place."""
 
 
-def with_effects(twin: Twin, constants: Mapping[str, float], effects: tuple[EffectValue, ...]) -> Twin:
+def with_effects(twin: Twin, constants: Mapping[str, float], effects: Sequence[EffectValue]) -> Twin:
     """The twin with constants set and effects on, each within what is physical."""
     changed = twin.with_nominal(**{name: float(value) for name, value in constants.items()})
     for value in effects:

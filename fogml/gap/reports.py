@@ -13,7 +13,7 @@ from fogml.gap.frame import whitener_of
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.posterior import Judgement
-from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Unknown, Verdict
+from fogml.gap.result import CandidateEvidence, Found, NoiseReport, Unknown, Verdict
 from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries
 from fogml.gap.where import averages
 from fogml.signals.bases import rate
@@ -70,23 +70,6 @@ def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[s
         stage = found.scene.candidates[family.id].stage if known else STAGES.get(family.id, UNKNOWN_STAGE)
         total[stage] = total.get(stage, 0.0) + energy
     return total
-
-
-def constants_of(found: Inference, after: Foretold) -> tuple[ConstantFit, ...]:
-    """The constants, before and after."""
-    deviations = found.setting.deviations
-    errors = np.sqrt(np.maximum(np.diagonal(after.posterior.covariance), 0.0))
-    return tuple(
-        ConstantFit(
-            c.name,
-            c.unit,
-            c.mean,
-            c.sd,
-            float(c.mean + sd * after.posterior.mean[i]),
-            float(sd * errors[i]),
-        )
-        for i, (c, sd) in enumerate(zip(found.setting.constants, deviations))
-    )
 
 
 def noise_of(found: Inference, after: Foretold) -> NoiseReport:

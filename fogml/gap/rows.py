@@ -26,6 +26,8 @@ from fogml.twin.nominal import (
     scale_factor_ppm,
     temperature_slopes,
 )
+from fogml.twin.replay import Replayer
+from fogml.twin.twin import Twin
 
 READ_GROUPS = (("T", "T_in"), ("T_out",))
 """Temperatures that drive the model, by the sensors that err together."""
@@ -118,6 +120,12 @@ class Rows:
     def of(self, values: FloatArray) -> FloatArray:
         """Rows of what is given on the even ones, shape (e, ...) to (m, ...)."""
         return values[self.kept]
+
+    def gap_of(self, twin: Twin) -> FloatArray:
+        """Recorded output less the replay of a twin at the smooth temperatures [deg/h], shape (m,)."""
+        smooth = self.by_sample.inputs(self.even, None).temperatures
+        replayer = Replayer(self.run).with_temperatures({name: smooth[name] for name in self.readings})
+        return self.of(self.by_sample.means(self.run.gyro_deg_h - replayer.output(twin)))
 
     def response(
         self,

@@ -92,7 +92,7 @@ def test_a_name_is_no_surer_than_its_evidence_and_what_carries_over(found):
 def test_a_cause_acts_since_it_left_a_trace(found):
     """Its course in the first run and a half of the second taken out of the data: it begins there."""
     best = found.explanations[0]
-    every = Foretold.of(found, best.members, best.members)
+    every = Foretold.of(found, best.members)
     (cause,) = judge(found).causes
     assert onset(found, every, cause) is None
     courses = [sum(every.of_member(i, m) for m in cause.members) for i in range(2)]
@@ -136,7 +136,7 @@ def test_members_of_a_class_are_told_apart_at_the_sizes_that_they_would_have(fou
 
 
 def test_what_causes_close_is_nothing_where_the_gap_is_no_more_than_noise(found):
-    foretold = Foretold.of(found, found.explanations[0].members, found.explanations[0].members)
+    foretold = Foretold.of(found, found.explanations[0].members)
     closed = _closed_share(found, foretold)
     assert 0.5 < closed <= 1.0
     assert _closed_share(found, SimpleNamespace(members=())) == 0.0

@@ -154,7 +154,7 @@ def next_run(
     """
     several = any(f.named and len(f.members) > 1 for f in items)
     if unknown and not several:
-        repeat = repeat_run(found, Foretold.of(found, judged.best.members, judged.best.members))
+        repeat = repeat_run(found, Foretold.of(found, judged.best.members))
         if repeat is not None:
             return repeat
     if not isinstance(found.model, TwinModel):

@@ -1,0 +1,59 @@
+"""The model that a diagnosis writes replays as the diagnosis says that it does."""
+
+import numpy as np
+import pytest
+
+from fogml.gap import diagnose
+from fogml.gap.model import TwinModel
+from fogml.gap.reading import rows_of
+from fogml.signals.averages import block_averages
+from fogml.twin.programme import load_programme
+from fogml.twin.replay import replay
+from fogml.twin.simulate import simulate
+from fogml.twin.twin_file import load_twin
+
+PROGRAMME = load_programme(
+    [
+        "soak at 20 degC for 1 h",
+        *(
+            step
+            for degc in (60, -20, 20)
+            for step in (
+                f"ramp to {degc} degC at 1 degC/min",
+                {
+                    f"soak at {degc} degC for 1 h": [
+                        "turn at 30 deg/s for 60 s, then -50 deg/s for 60 s, then 100 deg/s for 60 s, "
+                        "then -100 deg/s for 60 s, from minute 30"
+                    ]
+                },
+            )
+        ),
+    ]
+)
+
+
+@pytest.mark.parametrize(
+    ("id", "amplitude"),
+    [("input_axis_misalignment", 10.0), ("sf_hysteresis", 300.0), ("bias_polynomial", 0.5)],
+)
+def test_the_twin_that_is_written_replays_as_well_as_is_said(tmp_path, id, amplitude):
+    """A misalignment loses scale factor with its square, which a signature in proportion does not hold."""
+    twin = load_twin("nominal")
+    made = [simulate(PROGRAMME, twin.with_effect(id, amplitude), sample_s=20.0, seed=s).run for s in range(3)]
+    found = diagnose(twin, made[:2], made[2:], plan=False)
+    assert found.named[0].effect == id
+    found.write_model(TwinModel(twin), tmp_path / "twin.yaml")
+    written = load_twin(tmp_path / "twin.yaml")
+    told = found.how_far[0]
+    left = block_averages(
+        made[2].time, made[2].gyro_deg_h - replay(written, made[2]), window_s=told.averaging_s
+    )
+    rms = float(np.sqrt(np.mean(left.values[0] ** 2)))
+    assert rms == pytest.approx(told.after, rel=0.15)
+
+
+def test_a_gap_to_a_twin_is_that_of_the_rows():
+    twin = load_twin("tactical")
+    run = simulate(PROGRAMME, twin, sample_s=20.0, seed=1).run
+    rows = rows_of(run, twin, 400)
+    np.testing.assert_allclose(rows.gap_of(twin), rows.gap, atol=1e-9)
