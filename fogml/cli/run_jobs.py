@@ -16,10 +16,11 @@ from fogml.readers import plain_path
 from fogml.report.words import duration
 from fogml.runs.columns import header
 from fogml.runs.findings import FIRST_OF_ALL
-from fogml.runs.noise_of_run import noise_report
+from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
 from fogml.validation.limits import hold_strict
+from fogml.validation.settling import settling_warning
 
 _FIRST_ROWS = 5
 
@@ -221,6 +222,11 @@ def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
             runs.append(open_run(path, repair=settings.repair, axis=settings.axis))
         work.doing("averaging")
         values = noise_report(runs, overlapping=settings.overlapping)
+        told = [
+            w for run in runs if not moving_temperatures(run) and (w := settling_warning(run)) is not None
+        ]
+        values["warnings"] += told
+        values["notes"] += [warning["message"] for warning in told]
         if len(runs) == 1:
             values["floor"] = _floor(runs[0], values["taus_s"])
         return values

@@ -20,7 +20,7 @@ from fogml.runs.noise_series import (
     series_of,
     spectrum_of_runs,
 )
-from fogml.runs.noise_words import coarse_steps, doubts_of, gaps_of, model_told, words_of
+from fogml.runs.noise_words import coarse_steps, doubts_of, gaps_of, model_told, rounded_log, words_of
 from fogml.runs.run import Run
 from fogml.signals import large
 from fogml.signals.allan import AllanResult, allan_deviation
@@ -110,7 +110,7 @@ def noise_report(
             for one, spans in zip(series, moves)
             for warning in _warnings(one.run, spans, one.segments, one.sample_s)
         ),
-        *(warning for one in series for warning in coarse_steps(one)),
+        *(warning for one in series for warning in coarse_steps(one) or rounded_log(one, terms)),
         *doubts_of(terms, steady, alone),
     ]
     notes = [one.facts.notes for one in runs if one.facts.notes]

@@ -22,6 +22,8 @@ DOUBT = 1e-3
 DITHERED = 0.6
 """Standard deviation of samples, in steps of the output, from which on rounding to those makes white noise:
 an angle with 0.4 steps of noise a sample, and the rounding itself (simulated)."""
+ROUNDED = 0.01
+"""Share of N that rounding makes from which it is told."""
 MOST_LINES = 5
 """Sinusoids that are listed."""
 _BLOCK = 32
@@ -132,6 +134,22 @@ def coarse_steps(series: NoiseSeries) -> list[dict[str, str]]:
         "record more slowly, or finer, for N."
     )
     return [{"code": "coarse_steps", "message": message}]
+
+
+def rounded_log(series: NoiseSeries, terms: NoiseTerms) -> list[dict[str, str]]:
+    """A warning where the steps that an output is logged in, if rounded to, make part of N."""
+    step = recorded_step(max(series.stretches, key=len)[:HOLD_ROWS])
+    white = 3600.0 * terms.terms["N"].fitted ** 2 / series.new_s
+    # What is rounded is even over a step; an angle that is counted makes Q instead.
+    share = step**2 / 12.0 / white if white > 0.0 else 0.0
+    less = 1.0 - max(1.0 - share, 0.0) ** 0.5
+    if less < ROUNDED or share >= 1.0 or terms.terms["Q"].lower > 0.0:
+        return []
+    message = (
+        f"The output comes in steps of {step:.3g} deg/h: if the log rounds to them, and no angle is counted, "
+        f"N holds the rounding too, and that of the gyro itself is {less:.1%} less."
+    )
+    return [{"code": "rounded_log", "message": message}]
 
 
 def doubts_of(

@@ -148,7 +148,7 @@ def lag_of(runs: Sequence[Run], rows: int = Asked.rows, steps: int = 12) -> Lag 
         if step in (2, steps // 2):
             noise = _noise(table, tau)
         powers, bend, _ = _columns(table, tau, noise)
-        found, errors = _solved(noise, table, np.column_stack((powers, bend)))
+        found, errors = beside_constants(noise, table, np.column_stack((powers, bend)))
         se = float(errors[-1])
         moved = float(np.clip(found[-1], -tau / 2.0, tau))
         tau += moved
@@ -157,7 +157,7 @@ def lag_of(runs: Sequence[Run], rows: int = Asked.rows, steps: int = 12) -> Lag 
         if step > 2 and abs(moved) < 0.05 * se:
             break
     powers, bend, own = _columns(table, tau, noise)
-    found, errors = _solved(noise, table, np.column_stack((powers, bend, own)))
+    found, errors = beside_constants(noise, table, np.column_stack((powers, bend, own)))
     return Lag(tau, se, float(found[-1]), float(errors[-1]))
 
 
@@ -182,7 +182,7 @@ def _columns(
         2.0 * part * tau_s
     )
     powers = _powers(x)
-    found, _ = _solved(noise, table, powers)
+    found, _ = beside_constants(noise, table, powers)
     slope = found[0] + sum(k * found[k - 1] * x ** (k - 1) for k in range(2, _DEGREE + 1))
     return powers, slope * moves, slope * (table.X[:, 0] - x)
 
@@ -201,7 +201,9 @@ def _left(table: TrainingTable, tau_s: float) -> float:
     return float(off @ off)
 
 
-def _solved(noise: RunsNoise, table: TrainingTable, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+def beside_constants(
+    noise: RunsNoise, table: TrainingTable, columns: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Coefficients beside a constant of each run, and their standard errors."""
     triangles = noise.triangles(table, np.column_stack((np.ones(len(table)), columns)))
     # Without the first row of each triangle the run's constant is free.
