@@ -30,7 +30,9 @@ from fogml.validation.floors import floor_of_run
 from fogml.validation.run_errors import run_errors, training_means
 
 Row = dict[str, Any]
+NOTHING = "no model"
 OURS = ("fogml rbf", "fogml auto")
+AGAIN = (NOTHING, *OURS)
 FULL = Budget(settings=4, folds=3, most_rows=3000)
 QUICK = Budget(settings=2, folds=2, most_rows=120)
 _LABELS = ("axis", "train", "test", "programme", "trained")
@@ -41,7 +43,7 @@ def models(budget: Budget, quick: bool = False) -> dict[str, Callable[[], DriftM
     """Label to a function that makes the unfitted model."""
     peers = [peer for peer in PEERS if not quick or peer.name in QUICK_PEERS]
     return {
-        "no model": partial(make_model, "mean"),
+        NOTHING: partial(make_model, "mean"),
         OURS[0]: partial(make_model, "rbf"),
         OURS[1]: partial(make_model, "auto"),
         **{peer.name: partial(PeerModel, peer, budget) for peer in peers},
@@ -130,18 +132,22 @@ def case_of(row: Row) -> tuple[Any, ...]:
 
 
 def with_ours_again(found: Mapping[str, Any], rows: Sequence[Row], date: str) -> dict[str, Any]:
-    """A study's figures with rows of fogml's own models in place of those that were there.
+    """A study's figures with rows of fogml's own models, and every case's floor, in place of those there.
 
     Raises
     ------
     ValueError
-        If the rows are not of the same cases, judged on the same samples.
+        If the rows are not of the same cases, judged on the same samples: what no model leaves is the same.
     """
     new = {(case_of(row), row["model"]): row for row in rows}
-    old = {(case_of(row), row["model"]): row for row in found["rows"] if row["model"] in OURS}
-    if set(new) != set(old) or any(not np.isclose(new[k]["floor"], old[k]["floor"]) for k in old):
+    old = {(case_of(row), row["model"]): row for row in found["rows"] if row["model"] in AGAIN}
+    if set(new) != set(old) or any(
+        not np.isclose(new[k]["rms"], old[k]["rms"]) for k in old if k[1] == NOTHING
+    ):
         raise ValueError("the cases changed: measure the whole study again")
-    rows = [new.get((case_of(row), row["model"]), row) for row in found["rows"]]
+    floors = {case: row["floor"] for (case, _), row in new.items()}
+    kept = [new.get((case_of(row), row["model"]), row) for row in found["rows"]]
+    rows = [row | {"floor": floors[case_of(row)]} for row in kept]
     return {**found, "rows": rows, "ours_again": date}
 
 

@@ -284,16 +284,17 @@ def test_what_is_not_installed_is_named():
     assert "no_such_package is not installed" in (needs("numpy", "no_such_package")() or "")
 
 
-def test_own_rows_take_the_place_of_those_of_the_same_cases():
-    def row(model: str, axis: str, rms: float) -> dict:
-        return {"group": "made", "axis": axis, "model": model, "floor": 0.1, "rms": rms}
+def test_own_rows_and_floors_take_the_place_of_those_of_the_same_cases():
+    def row(model: str, axis: str, rms: float, floor: float = 0.1) -> dict:
+        return {"group": "made", "axis": axis, "model": model, "floor": floor, "rms": rms}
 
-    own, peer = accuracy.OURS[0], "cubic"
-    found = {"rows": [row(own, "x", 1.0), row(peer, "x", 2.0), row(own, "y", 3.0)], "budget": {}}
-    new = accuracy.with_ours_again(found, [row(own, "y", 5.0), row(own, "x", 4.0)], "2026-11-22")
-    assert [each["rms"] for each in new["rows"]] == [4.0, 2.0, 5.0]
+    nothing, own, peer = accuracy.NOTHING, accuracy.OURS[0], "cubic"
+    found = {"rows": [row(own, "x", 1.0), row(nothing, "x", 9.0), row(peer, "x", 2.0)], "budget": {}}
+    again = [row(nothing, "x", 9.0, 0.2), row(own, "x", 4.0, 0.2)]
+    new = accuracy.with_ours_again(found, again, "2026-11-22")
+    assert [(each["rms"], each["floor"]) for each in new["rows"]] == [(4.0, 0.2), (9.0, 0.2), (2.0, 0.2)]
     assert new["ours_again"] == "2026-11-22" and found["rows"][0]["rms"] == 1.0
-    moved = {**row(own, "x", 4.0), "floor": 0.2}
-    for other in ([row(own, "x", 4.0)], [moved, row(own, "y", 5.0)]):
+    # Other samples leave something else where no model is.
+    for other in (again[1:], [row(nothing, "x", 8.0), again[1]]):
         with pytest.raises(ValueError, match="measure the whole study"):
             accuracy.with_ours_again(found, other, "2026-11-22")
