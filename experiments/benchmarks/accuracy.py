@@ -194,7 +194,11 @@ def mean(values: Sequence[float]) -> float:
 def _budget_words(found: Mapping[str, Any]) -> str:
     b = found["budget"]
     again = found.get("ours_again")
-    later = f" fogml's own rows and all floors were measured again on {again}, the peers' are as they were." if again else ""
+    later = (
+        f" fogml's own rows and all floors were measured again on {again}, the peers' are as they were."
+        if again
+        else ""
+    )
     return (
         f"Each peer tries {b['settings']} settings on the same {b['folds']} folds of time blocks of the "
         f"training rows, averaged to at most {b['most_rows']:,} rows or fewer as its line in the list of "
