@@ -110,7 +110,9 @@ def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, An
         off = np.array([shape[name] - value for _, shape in values])
         off = (off + 180.0) % 360.0 - 180.0 if name in angles else off
         shape_se[name] = math.hypot(best.shape_se[name], math.sqrt(float(weights @ off**2)))
-    if any(best.shape_se[name] >= 180.0 for name in angles):
+    unknown = [name for name in angles if best.shape_se[name] >= 180.0]
+    across = dict(best.shape) | {name: best.shape[name] + 90.0 for name in unknown}
+    if unknown and np.any(field.response(declared, across) != field.response(declared, best.shape)):
         # What shows is the part along one direction; of two in three the whole is up to twice as large.
         se = math.hypot(se, amplitude)
     if getattr(declared, "digitises", False):

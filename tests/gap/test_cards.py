@@ -73,3 +73,24 @@ def test_sizes_directions_and_shapes_are_those_that_made_the_data(field, id, amp
             assert abs(off) < 4.0 * card.shape_se[name]
             inside[name] += abs(off) < 1.645 * card.shape_se[name]
     assert min(inside.values()) >= 2, "of four 90 % intervals fewer hold by chance but once in 270"
+
+
+def test_a_direction_that_does_not_matter_leaves_a_size_alone():
+    """A chamber's pick-up follows the duties of its machines where they are recorded: no period, no phase."""
+    time = 10.0 * np.arange(2000)
+    heater = (np.sin(2.0 * np.pi * time / 700.0) > 0.4).astype(float)
+    temperature = 25.0 + 20.0 * np.sin(2.0 * np.pi * time / time[-1])
+    columns = {
+        "T_in": temperature,
+        "T_out": temperature,
+        "heater": heater,
+        "compressor": 0.3 * (1.0 - heater),
+    }
+    run = Run.from_columns("a", time=time, gyro=np.zeros(len(time)), **columns)
+    field = foreseen(TwinModel(load_twin("nominal")), [run], NoiseModel(0.005, 0.0, 0.0), STANDARD).field
+    declared = field.setting.scene.candidates["chamber_pickup"]
+    made = field.response(declared, declared.default_shape("tactical"), 0.3)
+    card = card_of("chamber_pickup", field, replace(field.base, data=made), {})
+    assert card.value.amplitude == pytest.approx(0.3, rel=1e-3)
+    alone = field.base.length(made) ** -1.0
+    assert card.amplitude_se == pytest.approx(0.3 * np.hypot(alone, STANDARD.form_error), rel=0.02)
