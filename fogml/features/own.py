@@ -9,7 +9,8 @@ Three forms, by what they need to know:
 Their C, in floating and fixed point, follows from what they do: functions are called with symbols
 (`fogml.features.traced`). A function that can't be written so becomes a table; a window's weights are one.
 
-`declare` makes one known; so does a package's entry point in the group ``fogml.operators`` that names it.
+`declare` makes one known; so does a package's entry point in the group ``fogml.operators`` that names it,
+or the module that declares it.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from types import ModuleType
 
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
-from fogml.entry_points import loaded
+from fogml.entry_points import loaded, origin
 from fogml.errors import InputError
 from fogml.signals.clock import EXPONENTIAL_SPAN, check_window, longest_gap_s, needed_s
 from fogml.signals.kernel_windows import Kernel
@@ -213,7 +215,14 @@ def own_window(name: str) -> Kernel | None:
 def _known() -> dict[str, Declared]:
     global _looked_up
     if not _looked_up:
-        _looked_up = True
         for point in entry_points(group=GROUP):
-            declare(loaded(point))
+            found = loaded(point)
+            if isinstance(found, Declared):
+                declare(found)
+            elif not isinstance(found, ModuleType):  # a module has declared what it holds
+                raise InputError(
+                    f"{origin(point)} in group '{GROUP}': {point.value} is no operator; it has to name a "
+                    "Function, a Recursion or a Kernel, or a module that declares some"
+                )
+        _looked_up = True
     return _declared

@@ -14,7 +14,7 @@ from fogml.errors import InputError
 from fogml.features.atoms import Atom
 from fogml.features.operators import ring_of
 from fogml.features.terms import Step
-from fogml.models.regressors import goes_on_linearly
+from fogml.models.regressors import goes_on_linearly, own_regressors
 
 if TYPE_CHECKING:
     from fogml.models.rbf.network import Network
@@ -73,10 +73,12 @@ def compact_regressor(kind: str, regressor: Any) -> Compact:
     """
     network = network_of(regressor)
     if network is None:
+        remedy = "export it --to onnx, which takes its features"
+        if kind in own_regressors():
+            remedy = "its package gives one by a method 'compact' (fogml.models.compact.network_of)"
         raise InputError(
             f"a model of kind '{kind}' has no compact form: it is no linear part and Gaussians, as linear "
-            "models, rbf, and SVR, KernelRidge and Gaussian processes of Gaussian kernel are; export it "
-            "--to onnx, which takes its features"
+            f"models, rbf, and SVR, KernelRidge and Gaussian processes of Gaussian kernel are; {remedy}"
         )
     return Compact(kind, network, linear_beyond=goes_on_linearly(regressor))
 

@@ -32,6 +32,7 @@ from fogml.models.regressors import (
     fit_regressor,
     for_features,
     goes_on_linearly,
+    own_regressors,
     parameter_count,
     predict_rows,
     refit,
@@ -270,6 +271,8 @@ class FeatureModel(DriftModel):
         self.features_.set_box(card.box, card.slices, card.thermometer)
         self.regressor_ = regressor_from_saved(saved.regressor, arrays)
         columns = getattr(self.regressor_, "n_features_in_", None)
+        if columns is None and saved.kind in own_regressors():
+            columns = self.regressor_.n_features_in_ = len(self.features_)
         if columns != len(self.features_):
             raise InputError(f"the regressor takes {columns} features, {len(self.features_)} are stated")
 

@@ -19,7 +19,8 @@ A bare regressor has scikit-learn's ``fit(X, y)`` and ``predict(X)``. It may als
     JSON-ready values and arrays, and back, with ``n_features_in_``, the number of columns.
 
 Another package makes one known to the commands by the entry point group ``fogml.regressors``: the entry
-point's name is the model's, ``--model NAME``; its class has ``to_saved`` and ``from_saved``. Only what an
+point's name is the model's, ``--model NAME``; its class has ``to_saved`` and ``from_saved``, and from
+``sklearn.base.BaseEstimator`` ``get_params`` and ``set_params``. Only what an
 installed package declares so is ever loaded, whatever a file says.
 """
 
@@ -53,7 +54,7 @@ FORMS = {
 SKOPS = "skops"
 _PREDICTED_ROWS = 4096
 GROUP = "fogml.regressors"
-_NEEDED = ("fit", "predict", "to_saved", "from_saved")
+_NEEDED = ("fit", "predict", "to_saved", "from_saved", "get_params", "set_params")
 
 
 @cache

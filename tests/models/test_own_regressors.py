@@ -25,6 +25,23 @@ def test_it_keeps_the_contract_and_takes_parameters(tmp_path: Path) -> None:
     assert said(tmp_path, "trimmed = fogml_trimmed:TrimmedRegressor", code) == "0.2"
 
 
+def test_columns_that_it_does_not_count_are_counted_for_it(tmp_path: Path) -> None:
+    code = (
+        "from fogml_trimmed import TrimmedRegressor as Own\n"
+        "read = Own.from_saved\n"
+        "def uncounted(values, arrays):\n"
+        "    model = read(values, arrays); del model.n_features_in_; return model\n"
+        "Own.from_saved = uncounted\n"
+        "from fogml.models.names import make_model; from fogml.testing import check_model\n"
+        "from fogml.models.compact import compact_regressor; from fogml.errors import InputError\n"
+        "check_model(make_model('trimmed'))\n"
+        "try: compact_regressor('trimmed', Own())\n"
+        "except InputError as error: print(error)"
+    )
+    told = said(tmp_path, "trimmed = fogml_trimmed:TrimmedRegressor", code)
+    assert told.endswith("its package gives one by a method 'compact' (fogml.models.compact.network_of)")
+
+
 def test_spikes_do_not_move_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(OUTSIDE / "src"))
     from fogml_trimmed import TrimmedRegressor
@@ -42,7 +59,10 @@ def test_spikes_do_not_move_it(monkeypatch: pytest.MonkeyPatch) -> None:
             "trimmed = fogml_trimmed:Nothing",
             "entry point 'trimmed' of fogml-trimmed in group 'fogml.regressors' does not load",
         ),
-        ("trimmed = fogml.runs.run:Run", "is no regressor; it lacks fit, predict, to_saved, from_saved"),
+        (
+            "trimmed = fogml.runs.run:Run",
+            "is no regressor; it lacks fit, predict, to_saved, from_saved, get_params",
+        ),
         ("other = fogml_trimmed:TrimmedRegressor", "model 'trimmed' is not known"),
     ],
 )
