@@ -10,7 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["READERS", "Reader", "plain_path", "reader_of", "reader_of_content"]
+__all__ = ["READERS", "UNCALCULATED", "Reader", "plain_path", "reader_of", "reader_of_content"]
+
+UNCALCULATED = "uncalculated"
+"""Key by which a workbook is asked whether it has formulas without values."""
 
 
 @dataclass(frozen=True)

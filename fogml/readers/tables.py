@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 import zipfile
 from datetime import date, datetime, time, timedelta
 from functools import partial
@@ -12,8 +13,16 @@ from typing import Any
 
 import numpy as np
 
+from fogml.readers import UNCALCULATED
 from fogml.readers.columns import BLOCK_BYTES, MOST_COLUMNS, Column, Container, Rows, Spool
 
+_NO_VALUE = re.compile(
+    rb"<(?:\w+:)?c\b(?![^<>]*\bt=.str)[^<>]*>\s*<(?:\w+:)?f\b[^<>]*(?:/>|>[^<]*</(?:\w+:)?f>)"
+    rb"\s*(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</|</(?:\w+:)?c>)"
+)
+"""A cell of SpreadsheetML (ECMA-376, 18.3.1.4) with a formula and no value; type ``str`` has empty text."""
+_LONGEST_CELL = 1 << 14
+"""Bytes of such a cell: formulas have at most 8192 characters."""
 _UNIT_PROPERTIES = ("unit_string", "Unit", "unit", "NI_UnitDescription", "Units")
 
 
@@ -120,20 +129,49 @@ class Sheet:
 
 
 class Workbook(Container):
-    """A workbook: the text of each worksheet that is not empty, under its name."""
+    """A workbook: the text of each worksheet that is not empty, under its name, those first that are shown.
+
+    Of the attribute `UNCALCULATED` alone it tells whether there are formulas without values, and no sheet.
+    """
 
     def __init__(self, path: str, keys: list[str]) -> None:
-        from python_calamine import CalamineWorkbook
+        from python_calamine import CalamineWorkbook, SheetVisibleEnum
 
         super().__init__()
+        self.hidden: list[str] = []
+        self.is_uncalculated = UNCALCULATED in keys and _is_uncalculated(path)
+        if UNCALCULATED in keys:
+            return
         with CalamineWorkbook.from_path(path) as book:
-            for name in book.sheet_names:
+            self.hidden = [s.name for s in book.sheets_metadata if s.visible != SheetVisibleEnum.Visible]
+            for name in sorted(book.sheet_names, key=self.hidden.__contains__):
                 held = book.get_sheet_by_name(name)
                 # Rows above the first cell count, as they do in the program that shows them.
                 above = repeat((), (held.start or (0, 0))[0])
                 sheet = Sheet(self.spool, chain(above, held.iter_rows()))
                 if not sheet.is_empty:
                     self.add("", name, None, sheet)
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What the parent hears: also which sheets are hidden."""
+        return {**super().told, "hidden": self.hidden, UNCALCULATED: self.is_uncalculated}
+
+
+def _is_uncalculated(path: str) -> bool:
+    """Whether a cell of a workbook of XML has a formula and no value: its writer doesn't calculate."""
+    if not zipfile.is_zipfile(path):
+        return False
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.namelist():
+            if member.startswith("xl/worksheets/") and member.endswith(".xml"):
+                with archive.open(member) as file:
+                    before = b""
+                    while part := file.read(BLOCK_BYTES):
+                        if _NO_VALUE.search(before + part):
+                            return True
+                        before = part[-_LONGEST_CELL:]
+    return False
 
 
 def _cell(value: Any) -> str:

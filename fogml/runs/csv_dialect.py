@@ -192,9 +192,20 @@ def text_of(path: Path) -> str:
 
 def is_sure(content: bytes) -> bool:
     """Whether a text has a header that names a time and a gyro."""
-    head = content[:_HEAD_BYTES].decode("utf-8", errors="ignore")
-    header = header_over_lines(_LINE_END.split(head))
+    header = header_over_lines(_head_lines(content))
     return header is not None and header.is_sure
+
+
+def has_rows(content: bytes) -> bool:
+    """Whether a text has two rows or more below its header."""
+    lines = _head_lines(content)
+    header = header_over_lines(lines)
+    below = lines[header.data :] if header is not None else ()
+    return header is not None and sum(bool(line.strip(f"{header.separator} ")) for line in below) > 1
+
+
+def _head_lines(content: bytes) -> list[str]:
+    return _LINE_END.split(content[:_HEAD_BYTES].decode("utf-8", errors="ignore"))
 
 
 def _clock(

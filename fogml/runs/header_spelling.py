@@ -13,9 +13,12 @@ DATE_NAMES = frozenset({"date", "datum", "日期"})
 """What a column of dates beside one of times of day is called."""
 _OF_THE_GYRO = ("gyro", "fog", "coil", "sensor", "die", "imu")
 _WARM = ("temp", "temperature", "temperatur")
+_DATE_AND_TIME = (("date", "and", "time"), ("datum", "und", "zeit"), ("datum", "und", "uhrzeit"),
+                  ("日期", "和", "时间"))  # fmt: skip
 _SYNONYMS = {
-    "time": ("t", "timestamp", "datetime", "date/time", "dateandtime", "elapsed", "elapsedtime", "zeit",
-             "uhrzeit", "时间", "indexlevel0"),
+    "time": ("t", "timestamp", "elapsed", "elapsedtime", "zeit", "uhrzeit", "zeitstempel", "时间",
+             "indexlevel0",
+             *(d + mark + t for d, word, t in _DATE_AND_TIME for mark in ("", "/", ",", word))),
     "gyro": ("gyroscope", "gyrooutput", "gyrorate", "fog", "fogoutput", "fograte", "omega", "ω",
              "angularrate", "angularvelocity", "rotationrate", "drehrate", "kreisel",
              "kreiselausgang", "陀螺", "陀螺输出", "陀螺仪", "陀螺仪输出", "角速度"),

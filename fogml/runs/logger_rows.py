@@ -37,7 +37,8 @@ def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
     file = opened(path) if path.is_file() and path.stat().st_size else Opened("csv", path)
     kind = file.kind
     if kind == "csv":
-        return read_logger_text(file.path, layout, name)
+        table = read_logger_text(file.path, layout, name)
+        return replace(table, findings=(*table.findings, *(file.within.findings if file.within else ())))
     if layout.text_sources:
         raise InputError(f"{path.name}: texts and stamps are read from text files; name columns of numbers")
     columns, findings = container_columns(path, kind, layout.sources, _clock(layout))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zipfile
 
 import numpy as np
 import pytest
@@ -109,6 +110,96 @@ def test_a_workbook_is_read(tmp_path):
     pytest.importorskip("xlsxwriter")
     write_book(path := tmp_path / "book.xlsx")
     np.testing.assert_allclose(read_run(path).temperature("T"), INNER, atol=1e-4)
+
+
+RUN = [HEADER.split(","), *([float(cell) for cell in row.split(",")] for row in ROWS)]
+
+
+def book_of(path, sheets):
+    """A workbook of sheets: name, whether it is hidden, rows."""
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, is_hidden, rows in sheets:
+        sheet = book.create_sheet(name)
+        sheet.sheet_state = "hidden" if is_hidden else "visible"
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+
+
+def test_the_sheet_that_is_shown_comes_before_a_hidden_one(tmp_path):
+    other = [RUN[0], *([t, g + 100.0, a, b] for t, g, a, b in RUN[1:])]
+    book_of(path := tmp_path / "book.xlsx", [("old", True, other), ("shown", False, RUN)])
+    run = read_run(path)
+    np.testing.assert_allclose(run.gyro, GYRO, atol=1e-6)
+    assert "hidden_sheet" not in {finding.code for finding in run.findings}
+
+
+def test_a_hidden_sheet_is_read_where_no_other_holds_a_run_and_is_told(tmp_path):
+    book_of(path := tmp_path / "book.xlsx", [("notes", False, [["Test", "4"]]), ("data", True, RUN)])
+    run = read_run(path)
+    np.testing.assert_allclose(run.gyro, GYRO, atol=1e-6)
+    (finding,) = (finding for finding in run.findings if finding.code == "hidden_sheet")
+    assert "'data'" in finding.message
+
+
+@pytest.mark.parametrize(
+    ("columns", "place"), [((0,), ", column 'time'"), ((1,), ", column 'gyro'"), ((0, 1, 2, 3), "")]
+)
+def test_formulas_without_values_are_told(tmp_path, columns, place):
+    formulas = {0: "=A{0}+10", 1: "=10+0.02*C{0}", 2: "=20+ROW()", 3: "=C{0}+0.5"}
+    rows = [
+        [formulas[i].format(at) if i in columns else value for i, value in enumerate(row)]
+        for at, row in enumerate(RUN[1:], start=1)
+    ]
+    book_of(path := tmp_path / "book.xlsx", [("data", False, [RUN[0], *rows])])
+    said = rf"book\.xlsx{place}: empty, .* formulas without values; open the file in a spreadsheet program"
+    with pytest.raises(InputError, match=said):
+        read_run(path)
+    # The first row may hold the values that formulas go on from.
+    book_of(path, [("data", False, [RUN[0], RUN[1], *rows[1:]])])
+    with pytest.raises(InputError, match=said if place else "formulas without values"):
+        read_run(path)
+
+
+def test_an_empty_column_without_formulas_and_formulas_with_values_are_told_apart(tmp_path):
+    xlsxwriter = pytest.importorskip("xlsxwriter")
+    path = tmp_path / "book.xlsx"
+    with xlsxwriter.Workbook(str(path)) as book:
+        sheet = book.add_worksheet()
+        for place, row in enumerate(RUN):
+            sheet.write_row(place, 0, [row[0], None, *row[2:]] if place else [*row, "note", "again"])
+            if place:
+                sheet.write_formula(place, 4, '=IF(A1>0,"","")', None, "")
+                sheet.write_formula(place, 5, "=A1", None, row[0])
+    # Nothing is what the formula shows, which Excel writes as an empty text.
+    with zipfile.ZipFile(path) as archive:
+        held = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in held.items():
+            archive.writestr(name, re.sub(rb'<c (r="E\d+")>', rb'<c \1 t="str">', content))
+    with pytest.raises(InputError, match=r"column 'gyro', line 2: the value is missing"):
+        read_run(path)
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        "Date/Time",
+        "Datum/Zeit",
+        "Datum Zeit",
+        "Datum / Uhrzeit",
+        "Datum und Uhrzeit",
+        "日期/时间",
+        "日期时间",
+    ],
+)
+def test_date_and_time_in_one_column_by_its_name(tmp_path, cell):
+    write(
+        path := tmp_path / "run.csv", text(f"{cell},gyro [deg/h],T_in [degC],T_out [degC]", map(moment, ROWS))
+    )
+    np.testing.assert_allclose(read_run(path).time, TIME)
 
 
 @pytest.mark.parametrize("name", ANSWERED)
