@@ -1,4 +1,4 @@
-"""Folders as a whole, exchanged for another in one step."""
+"""Folders as a whole, exchanged for another in one step; paths that are spelled as on another system."""
 
 from __future__ import annotations
 
@@ -8,7 +8,26 @@ import shutil
 import sys
 from pathlib import Path
 
+from fogml.errors import printable
+
 _AT_CWD, _RENAME_EXCHANGE = -100, 2  # of Linux
+
+
+def with_slashes(path: str | Path, *folders: Path) -> str:
+    r"""``; did you mean a/b.csv?`` where a path that is not there has backslashes and is there with slashes.
+
+    Parameters
+    ----------
+    path
+        As it was written, e.g. ``..\in\a.csv``.
+    folders
+        Where it may be meant from beside the one that one is in.
+    """
+    slashed = str(path).replace("\\", "/")
+    if slashed == str(path) or os.path.exists(path):
+        return ""
+    found = any(os.path.exists(folder / slashed) for folder in (Path(), *folders))
+    return f"; did you mean {printable(slashed)}?" if found else ""
 
 
 def nearest_folder(path: Path) -> Path:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fogml.errors import InputError, printable, quoted
+from fogml.folders import with_slashes
 
 MOST_BYTES = 256 << 20
 """Largest file that is read [bytes]: the results of a thousand units take a tenth of it."""
@@ -45,7 +46,7 @@ def read_bytes(path: Path, remedy: str, most_bytes: int = MOST_BYTES) -> bytes:
         with path.open("rb") as file:
             data = file.read(most_bytes + 1)
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file; {remedy}") from None
+        raise InputError(f"{path}: no such file{with_slashes(path) or f'; {remedy}'}") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     if len(data) > most_bytes:

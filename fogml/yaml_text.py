@@ -18,6 +18,7 @@ from typing import Any, NoReturn
 import yaml
 
 from fogml.errors import InputError, printable, quoted
+from fogml.folders import with_slashes
 
 MOST_BYTES = 4 << 20
 """Size of a file: a manifest of 30,000 units takes as much, and it is read within seconds."""
@@ -51,7 +52,7 @@ def read_yaml(path: Path, as_text: Collection[str] = ()) -> Any:
             content = file.read(MOST_BYTES + 1)
         text = content.decode("utf-8-sig")
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+        raise InputError(f"{path}: cannot be read ({error.strerror}){with_slashes(path)}") from None
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError(f"{path.name}, line {line}: is no UTF-8 text; save it in UTF-8") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from inspect import get_annotations
@@ -12,7 +13,8 @@ from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from fogml import __version__
 from fogml.cli.given import Given, option
-from fogml.errors import InputError, known_are, listed, quoted
+from fogml.errors import InputError, known_are, listed, printable, quoted
+from fogml.folders import with_slashes
 from fogml.locks import sole_writer
 from fogml.outputs import check_is_no_folder, whole_file
 from fogml.strict import Strict, first_fault
@@ -60,11 +62,14 @@ class Settings(Strict):
         """The settings from a YAML file and from flags; a flag that is None or empty is not set."""
         stated = read_config(config) if config is not None else {}
         # A path in a configuration file may be meant from where the file lies.
-        for key in set(stated) & set(cls.path_keys):
+        source = config.name if config is not None else "settings"
+        for key in [key for key in stated if key in cls.path_keys]:
             assert config is not None
+            _check_slashes(stated[key], f"{source}: '{key}': ", config.parent)
             stated[key] = _beside(stated[key], config.parent)
         given = {name: value for name, value in flags.items() if value is not None and value != []}
-        source = config.name if config is not None else "settings"
+        for key in [key for key in given if key in cls.path_keys]:
+            _check_slashes(given[key], "")
         try:
             return cls.model_validate({**stated, **given})
         except ValidationError as error:
@@ -150,9 +155,16 @@ def _beside(value: Any, folder: Path) -> Any:
     """A path as it stands if something is there, else the one in the configuration's folder if so."""
     if isinstance(value, list):
         return [_beside(item, folder) for item in value]
-    if isinstance(value, str) and not Path(value).exists() and (folder / value).exists():
+    if isinstance(value, str) and not os.path.exists(Path(value)) and os.path.exists(folder / value):
         return str(folder / value)
     return value
+
+
+def _check_slashes(value: Any, place: str, *folders: Path) -> None:
+    """Refuse a path with backslashes that is there with slashes."""
+    for path in value if isinstance(value, list) else [value]:
+        if isinstance(path, str) and (hint := with_slashes(path, *folders)):
+            raise InputError(f"{place}{printable(path)}: no such file{hint}")
 
 
 def absolute(path: str) -> str:

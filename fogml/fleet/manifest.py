@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError, known_are, quoted
+from fogml.folders import with_slashes
 from fogml.runs.csv_dialect import text_of
 from fogml.yaml_text import read_yaml
 
@@ -82,7 +83,7 @@ def read_manifest(path: str | Path) -> list[Unit]:
     path = Path(path)
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "no such file"
-        raise InputError(f"{path}: {what}; a manifest was expected, CSV or YAML")
+        raise InputError(f"{path}: {what}{with_slashes(path)}; a manifest was expected, CSV or YAML")
     rows = _yaml_rows(path) if path.suffix.lower() in (".yaml", ".yml") else _csv_rows(path)
     units = [_unit(row, place, path) for place, row in rows]
     if not units:
@@ -189,7 +190,7 @@ def _found(run: str, place: str, folder: Path, faults: list[str]) -> str:
     for home in (Path(), folder):
         if (home / run).is_file():
             return str((home / run).absolute())
-    faults.append(f"{place}: {run}: no such file, here or beside the manifest")
+    faults.append(f"{place}: {run}: no such file, here or beside the manifest{with_slashes(run, folder)}")
     return str((folder / run).absolute())
 
 

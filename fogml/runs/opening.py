@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fogml.errors import InputError
+from fogml.folders import with_slashes
 from fogml.readers import READERS, reader_of, reader_of_content
 from fogml.runs.held_texts import HOLDING, HeldText
 from fogml.runs.raw_table import RawTable, empty_file
@@ -83,7 +84,7 @@ def file_format(path: Path) -> str:
 def _format_of_content(path: Path) -> str:
     try:
         if not path.exists():
-            raise InputError(f"{path}: no such file")
+            raise InputError(f"{path}: no such file{with_slashes(path)}")
         if path.is_dir() and (path / "metadata.yaml").is_file():
             raise InputError(f"{path}: is the folder of a ROS 2 bag; name its .db3 or .mcap file")
         if path.is_dir():

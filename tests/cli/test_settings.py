@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from importlib import import_module
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from fogml.cli.run_commands import ImportSettings
 from fogml.cli.settings import Settings
 from fogml.cli.twin_commands import ReplaySettings, SimulateSettings
 from fogml.errors import InputError
+from fogml.runs.reading import read_run
 from fogml.yaml_text import parse_yaml
 
 
@@ -71,6 +73,33 @@ def test_a_missing_file_and_a_folder_are_errors(tmp_path):
         TrainSettings.gather(tmp_path / "none.yaml", {})
     with pytest.raises(InputError, match="directory"):
         TrainSettings.gather(tmp_path, {})
+
+
+def test_a_path_with_backslashes_that_is_there_with_slashes_is_told(tmp_path, monkeypatch):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "a.csv").touch()
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    where = r"\.\.\\in\\a\.csv: no such file; did you mean \.\./in/a\.csv\?"
+    with pytest.raises(InputError, match=rf"^{where}"):
+        TrainSettings.gather(None, {"runs": [r"..\in\a.csv"]})
+    path = config(tmp_path / "here", "runs: ['..\\in\\a.csv']\n")
+    monkeypatch.chdir(tmp_path / "in")  # the path is meant from where the file lies
+    with pytest.raises(InputError, match=rf"^settings\.yaml: 'runs': {where}"):
+        TrainSettings.gather(path, {})
+    with pytest.raises(InputError, match=r"No such file .*; did you mean \.\./here/settings\.yaml\?"):
+        TrainSettings.gather(Path(r"..\here\settings.yaml"), {})
+    with pytest.raises(InputError, match=r"did you mean \.\./in/a\.csv\?"):
+        read_run(r"..\in\a.csv")
+
+
+def test_backslashes_of_what_is_nowhere_or_is_named_so_are_left(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / r"in\a.csv").touch()
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "a.csv").touch()
+    runs = [r"in\a.csv", r"no\a.csv", "a" * 5000]
+    assert TrainSettings.gather(config(tmp_path, f"runs: {json.dumps(runs)}\n"), {}).runs == runs
 
 
 def test_a_value_of_the_wrong_kind_names_its_key(tmp_path):

@@ -104,10 +104,16 @@ def test_faults(folder, text, message):
     ("runs", "fault"),
     [
         ("a.csv,missing.csv", "m.csv: row 2: column 'test': missing.csv: no such file"),
+        (
+            r".\sub\..\a.csv,b.csv",
+            r"m.csv: row 2: column 'train': .\sub\..\a.csv: no such file, here or beside the manifest; "
+            "did you mean ./sub/../a.csv?",
+        ),
         ("shipped:nothing,b.csv", "m.csv: row 2: column 'train': shipped:nothing: no such recording ships"),
     ],
 )
 def test_a_run_that_is_not_there_is_its_unit_s_fault(folder, runs, fault):
+    (folder / "sub").mkdir()
     text = HEAD + f"F-1,train,{runs},x\nF-2,train,a.csv,b.csv,x\n"
     first, second = read_manifest(manifest(folder, text))
     assert first.fault.startswith(fault)
