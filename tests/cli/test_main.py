@@ -319,6 +319,7 @@ def do_job(settings, name, terminal):
     raise {"import": ImportError, "input": InputError, "none": AssertionError}[error]("a library's own words")
 
 command.do_job = do_job
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a suite in the background ignores it
 main.app = lambda prog_name, app=main.app: app(["docs"], prog_name=prog_name)
 main.main()
 """
