@@ -71,7 +71,9 @@ class _Handler(RequestHandler):
     def write_error(self, status_code: int, **kwargs: Any) -> None:
         """One line of text."""
         error = kwargs.get("exc_info", (None, None, None))[1]
-        told = error.log_message if isinstance(error, HTTPError) and error.log_message else self._reason
+        told = self._reason
+        if isinstance(error, HTTPError) and error.log_message:
+            told = error.log_message % error.args
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(told)
 
@@ -96,7 +98,7 @@ class _Handler(RequestHandler):
         try:
             told = json.loads(self.request.body)
             command, values = told["command"], told["values"]
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             raise HTTPError(400, "no form") from None
         if not isinstance(command, str) or not isinstance(values, dict):
             raise HTTPError(400, "no form")
@@ -184,7 +186,7 @@ class _NewJob(_Handler):
             self.app.words(command, values, "")
             name = self.app.jobs.add(lambda results: self.app.words(command, values, results))
         except FogmlError as error:
-            raise HTTPError(400, str(error).replace("%", "%%")) from None
+            raise HTTPError(400, str(error)) from None
         self.answer({"name": name})
 
 
@@ -227,13 +229,15 @@ class _Upload(_Handler):
         try:
             self.app.files.place(unquote(self.path_args[0]))
         except InputError as error:
-            raise HTTPError(400, str(error).replace("%", "%%")) from None
+            raise HTTPError(400, str(error)) from None
         self._file = tempfile.NamedTemporaryFile(  # noqa: SIM115
             dir=self.app.files.folder, prefix=".upload-", delete=False
         )
         self.partial = Path(self._file.name)
 
     def data_received(self, chunk: bytes) -> None:
+        if self.partial is None:
+            return  # of another method than PUT
         try:
             self._file.write(chunk)
         except OSError as error:
@@ -246,14 +250,14 @@ class _Upload(_Handler):
         try:
             self.app.files.keep(partial, unquote(name))
         except InputError as error:
-            raise HTTPError(409, str(error).replace("%", "%%")) from None
+            raise HTTPError(409, str(error)) from None
         self.answer({})
 
     def delete(self, name: str) -> None:
         try:
             self.app.files.remove(unquote(name))
         except InputError as error:
-            raise HTTPError(404, str(error).replace("%", "%%")) from None
+            raise HTTPError(404, str(error)) from None
         self.answer({})
 
     def on_finish(self) -> None:
@@ -275,8 +279,12 @@ class _Result(_Handler):
 
     async def get(self, name: str, path: str) -> None:
         home = (self.job_folder(name) / "results").resolve()
-        place = (home / unquote(path)).resolve()
-        if not place.is_relative_to(home) or not place.is_file():
+        try:
+            place = (home / unquote(path)).resolve()
+            is_there = place.is_relative_to(home) and place.is_file()
+        except (OSError, ValueError):  # no name that the system has
+            is_there = False
+        if not is_there:
             raise HTTPError(404, "there is no such file any more")
         self.set_header("Content-Security-Policy", _RESULT_POLICY)
         if place.suffix == ".html":

@@ -83,6 +83,8 @@ class Files:
             self.place(name).unlink()
         except FileNotFoundError:
             raise InputError(f"{quoted(name)} is not here any more") from None
+        except OSError as error:
+            raise InputError(f"{quoted(name)} cannot be removed ({error.strerror})") from None
 
 
 OFFERED = ("model", "models", "twin", "file", "profile", "manifest", "fleet")

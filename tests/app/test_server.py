@@ -106,6 +106,37 @@ def test_results_are_pages_of_an_origin_of_their_own_and_nothing_else_is_given(a
     assert app.ask("GET", "/results/0043/page.html")[0] == 404
 
 
+@pytest.mark.parametrize(
+    ("method", "path", "body", "status"),
+    [
+        *(("GET", f"/results/0044/{name}", None, 404) for name in ("%00", "a%00b", "x" * 300, "x%2f" * 3000)),
+        ("POST", "/api/files/a.csv", b"x", 405),
+        ("PATCH", "/api/files/a.csv", b"x", 405),
+        ("DELETE", "/api/files/folder", b"x", 404),
+        ("POST", "/api/jobs", b"[" * 100_000, 400),
+        ("POST", "/api/command", b'{"a":' * 100_000, 400),
+    ],
+)
+def test_what_no_page_asks_is_no_fault_of_the_server(app, method, path, body, status):
+    results = app.folder / "jobs" / "0044" / "results"
+    results.mkdir(parents=True, exist_ok=True)
+    (results.parent / "job.json").write_text('{"words": ["docs"], "made": ""}')
+    (results.parent / "ended.json").write_text('{"status": 0, "seconds": 1.0}')
+    (folder := app.folder / "files" / "folder").mkdir()
+    try:
+        assert app.ask(method, path, body)[0] == status
+    finally:
+        folder.rmdir()
+
+
+def test_a_per_cent_sign_in_a_name_is_told_as_it_is(app):
+    assert app.ask("PUT", "/api/files/100%25.csv", b"x")[0] == 200
+    try:
+        assert "'100%.csv'" in app.ask("PUT", "/api/files/100%25.csv", b"x")[1]
+    finally:
+        assert app.ask("DELETE", "/api/files/100%25.csv")[0] == 200
+
+
 def test_a_bad_form_is_one_line_and_no_job(app):
     before = len(list((app.folder / "jobs").iterdir()))
     for told in ({"command": "blind", "values": {}}, {"command": "inspect", "values": {"out": "/tmp/x"}}):
