@@ -98,6 +98,9 @@ class _Handler(RequestHandler):
         try:
             told = json.loads(self.request.body)
             command, values = told["command"], told["values"]
+            # No command line holds halves of characters or zero bytes.
+            if b"\\u0000" in json.dumps(told, ensure_ascii=False).encode():
+                raise ValueError
         except (ValueError, KeyError, TypeError, RecursionError):
             raise HTTPError(400, "no form") from None
         if not isinstance(command, str) or not isinstance(values, dict):

@@ -114,6 +114,8 @@ def test_results_are_pages_of_an_origin_of_their_own_and_nothing_else_is_given(a
         ("PATCH", "/api/files/a.csv", b"x", 405),
         ("DELETE", "/api/files/folder", b"x", 404),
         ("POST", "/api/jobs", b"[" * 100_000, 400),
+        ("POST", "/api/jobs", {"command": "noise", "values": {"axis": "\ud800"}}, 400),
+        ("POST", "/api/jobs", {"command": "noise", "values": {"axis": "a\0b"}}, 400),
         ("POST", "/api/command", b'{"a":' * 100_000, 400),
     ],
 )
