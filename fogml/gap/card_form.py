@@ -35,12 +35,9 @@ class _Unknown:
     @property
     def _law(self) -> tuple[float, float, bool]:
         """Middle and standard deviation of the prior, and whether they are of the logarithm."""
-        low, high = self.quantity.range(self.grade)
         if self.quantity.signed:
-            return 0.0, high / Z90, False
-        if low > 0.0:
-            return 0.5 * math.log(low * high), 0.5 * math.log(high / low) / Z90, True
-        return 0.5 * (low + high), 0.5 * (high - low) / Z90, False
+            return 0.0, self.quantity.range(self.grade)[1] / Z90, False
+        return self.quantity.law(self.grade)
 
     @property
     def weight(self) -> float:

@@ -20,8 +20,8 @@ from fogml.lab.misalignment_errors import ROUND_OFF, ScaleDrift, Slopes
 from fogml.lab.misalignment_states import pairs_of
 from fogml.signals.distributions import variances_sf
 
-_ITERATIONS = 20
-_TERMS = 2
+_ITERATIONS = 20  # of Gauss and Newton at most: three or four do
+_TERMS = 2  # a line and a square, as a warm-up slows down
 
 
 def scale_drift(

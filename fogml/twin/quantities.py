@@ -68,18 +68,20 @@ class Quantity:
             value = math.copysign(max(float(round(abs(value))), 1.0), value)
         return float(np.clip(value, *self.limits))
 
+    def law(self, grade: Grade) -> tuple[float, float, bool]:
+        """Middle and standard deviation of the prior, of a `signed` one's size; whether of the logarithm."""
+        low, high = self.range(grade)
+        if low > 0.0:
+            return 0.5 * math.log(low * high), 0.5 * math.log(high / low) / Z90, True
+        return 0.5 * (low + high), 0.5 * (high - low) / Z90, False
+
     def draw(self, rng: np.random.Generator, grade: Grade = "tactical") -> float:
         """A value from the prior: log-normal with the range as its central 90 %, normal where
         the range reaches zero or below; the sign is fair where `signed`; within `limits`."""
-        low, high = self.range(grade)
-        z = float(rng.standard_normal())
+        middle, spread, log = self.law(grade)
+        value = middle + spread * float(rng.standard_normal())
         sign = float(rng.choice((-1.0, 1.0))) if self.signed else 1.0
-        if low > 0.0:
-            middle, spread = 0.5 * math.log(low * high), 0.5 * math.log(high / low) / Z90
-            value = math.exp(middle + spread * z)
-        else:
-            value = 0.5 * (low + high) + 0.5 * (high - low) / Z90 * z
-        return self.within(sign * value)
+        return self.within(sign * (math.exp(value) if log else value))
 
     def check(self, value: float, owner: str) -> float:
         """The value as a float.
