@@ -56,7 +56,7 @@ def told_by_family(found: Inference, cause: Cause) -> Mapping[str, Any]:
 
 def in_form(declared: Effect) -> bool:
     """Whether an amplitude is fitted, the same on all runs: no spread over them, no step read off."""
-    return not (_spreads(declared) or getattr(declared, "digitises", False))
+    return not (_spreads(declared) or declared.digitises)
 
 
 def _spreads(declared: Effect) -> bool:
@@ -115,7 +115,7 @@ def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, An
     if unknown and np.any(field.response(declared, across) != field.response(declared, best.shape)):
         # What shows is the part along one direction; of two in three the whole is up to twice as large.
         se = math.hypot(se, amplitude)
-    if getattr(declared, "digitises", False):
+    if declared.digitises:
         amplitude, se = _step(scene.fit, amplitude, se)
     return Card(EffectValue(id, amplitude, best.shape), se, shape_se)
 
@@ -130,7 +130,6 @@ def _starts(declared: Effect, field: Field, beside: LinearGaussian, told: Mappin
     stacked = field.whitening.stacked([np.concatenate([b.columns for b in own], axis=1) for own in by_run])
     least = max(map(abs, declared.amplitude.limits)) ** -2.0
     angles = [q.name for q in declared.shape if is_angle(q)]
-
     _, usual = declared.amplitude.range(scene.grade)
     tried: list[tuple[float, Start]] = []
     at = 0

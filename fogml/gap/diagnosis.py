@@ -187,7 +187,7 @@ def _answer(
     recalibrated = Foretold.of(found, ())
     every = Foretold.of(found, likeliest)
     # Beside nothing that nobody would add: two that cancel foretell nothing, one of them left out.
-    after = Foretold.of(found, [m for c in named for m in c.members])
+    after = Foretold.of(found, [m for c in named for m in c.members]) if named else recalibrated
     shares = cause_shares(found, judged, every, recalibrated, seed)
     share = {s.effect: s.share for s in shares if s.run is None and s.regime is None}
     cards = cards_of(found, judged)

@@ -69,6 +69,8 @@ class Effect(ABC):
         its own signature over a grid of its shapes.
     place
         Where it sits: what temperature drives it, and where to look for it.
+    digitises
+        Whether it acts on the number that is read, behind a sensor's lag and noise.
     seeded
         Whether a simulation draws what differs each time itself, from its seed: then repeats leave the
         amplitude alone, and a replay, which can't know the draw, has what is expected of it.
@@ -93,6 +95,7 @@ class Effect(ABC):
     seeded: ClassVar[bool] = False
     family: ClassVar[str] = "signature"
     place: ClassVar[str] = ""
+    digitises: ClassVar[bool] = False
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
@@ -189,8 +192,6 @@ class SensorEffect(Effect):
     """
 
     stage: ClassVar[Stage] = "sensor"
-    digitises: ClassVar[bool] = False
-    """Whether it acts on the number that is read, behind the sensor's lag and noise."""
 
     @abstractmethod
     def sense(

@@ -83,7 +83,7 @@ def _may_show(declared: Effect) -> bool:
     """Whether a programme may show it: not the steps of a record, nor a random error."""
     if isinstance(declared, NoiseEffect):
         return declared.steady
-    return not getattr(declared, "digitises", False)
+    return not declared.digitises
 
 
 def lengths(rehearsal: Rehearsal, values: Sequence[EffectValue]) -> FloatArray:
