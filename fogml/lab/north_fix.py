@@ -8,6 +8,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.lab.north import DriftError, horizontal_rate
+from fogml.lab.north_schemes import wrapped
 from fogml.runs.run import Run
 
 ANY_DEG = 180.0 / float(np.sqrt(3.0))
@@ -113,7 +114,7 @@ def fix_notes(fix: NorthFix, covariance: FloatArray | None, bent_se_deg: float |
     bend, bend_se, bent = fix.bend_deg_h_h2, fix.bend_se, fix.bent_deg
     if fix.method == "bend-observing" or bend is None or bent is None or not bend_se:
         return told
-    moved = abs((bent - fix.azimuth_deg + 180.0) % 360.0 - 180.0)
+    moved = float(abs(wrapped(bent - fix.azimuth_deg)))
     if abs(bend) > _BEND_SHOWS * bend_se and moved > _LAST_DIGIT_DEG:
         told.append(
             f"the bias bends during the seek, as at start-up ({abs(bend) / bend_se:.1f} standard errors), "
@@ -174,7 +175,7 @@ def angle_notes(run: Run, times_s: FloatArray, turned_deg: FloatArray, tolerance
     recorded, turned = recorded - recorded[0], turned_deg - turned_deg[0]
 
     def off(way: float) -> FloatArray:
-        return np.abs((recorded - way * turned + 180.0) % 360.0 - 180.0)
+        return np.abs(wrapped(recorded - way * turned))
 
     worst = int(np.argmax(off(1.0)))
     if off(1.0)[worst] <= tolerance_deg:

@@ -17,6 +17,7 @@ from fogml.lab.north import (
     design_matrix,
 )
 from fogml.lab.north_fix import NorthFix, angle_notes, azimuth_se, fix_notes, set_up_notes
+from fogml.lab.north_schemes import wrapped
 from fogml.models.linear import LinearRegressor
 from fogml.models.row_noise import MEANS_A_STAY, noise_covariance
 from fogml.models.table import RunRows
@@ -159,7 +160,7 @@ def _recorded_positions(run: Run, order_deg: Sequence[float], sense: str, tolera
         )
     # The table's angle counts counter-clockwise.
     turned = run.columns["angle"] * (-1.0 if sense == "cw" else 1.0)
-    off = (turned[:, None] - np.asarray(order_deg, dtype=np.float64) + 180.0) % 360.0 - 180.0
+    off = wrapped(turned[:, None] - np.asarray(order_deg, dtype=np.float64))
     nearest = np.argmin(np.abs(off), axis=1)
     there = np.abs(off[np.arange(len(off)), nearest]) <= tolerance_deg
     position = np.where(there, nearest + 1.0, 0.0)

@@ -175,6 +175,18 @@ def shift_of_runs(units: Sequence[FloatArray], median: float, spread: float) -> 
     return float(weights @ sizes)
 
 
+def beside_constants(
+    noise: RunsNoise, table: TrainingTable, columns: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Coefficients of columns (n, k) beside a constant of each run, and their standard errors, (k,) each."""
+    triangles = noise.triangles(table, np.column_stack((np.ones(len(table)), columns)))
+    # Without the first row of each triangle the run's constant is free.
+    parts = np.concatenate([triangle[1:, 1:] for triangle in triangles])
+    corner: FloatArray = np.asarray(np.linalg.qr(parts, mode="r"))
+    inverse = np.linalg.pinv(corner[:-1, :-1], rcond=1e-12)
+    return inverse @ corner[:-1, -1], np.linalg.norm(inverse, axis=1)
+
+
 def _weighed_sizes(
     likelihood: Callable[[float], float], median: float, spread: float, reach: float = 4.0, count: int = 41
 ) -> tuple[FloatArray, FloatArray]:

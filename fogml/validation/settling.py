@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.models.generalised_least_squares import runs_noise
+from fogml.models.generalised_least_squares import beside_constants, runs_noise
 from fogml.models.table import RunRows, averaged_table
 from fogml.runs.run import Run
-from fogml.validation.thermometer_lag import beside_constants
 
 
 def settling_warning(

@@ -23,7 +23,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
-from fogml.models.generalised_least_squares import RunsNoise, runs_noise
+from fogml.models.generalised_least_squares import RunsNoise, beside_constants, runs_noise
 from fogml.models.table import (
     TrainingTable,
     averaged_table,
@@ -199,15 +199,3 @@ def _left(table: TrainingTable, tau_s: float) -> float:
     columns = np.column_stack((runs, _powers(_lagged(table, tau_s))))
     off = table.y - columns @ np.linalg.lstsq(columns, table.y, rcond=None)[0]
     return float(off @ off)
-
-
-def beside_constants(
-    noise: RunsNoise, table: TrainingTable, columns: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Coefficients beside a constant of each run, and their standard errors."""
-    triangles = noise.triangles(table, np.column_stack((np.ones(len(table)), columns)))
-    # Without the first row of each triangle the run's constant is free.
-    parts = np.concatenate([triangle[1:, 1:] for triangle in triangles])
-    corner: FloatArray = np.asarray(np.linalg.qr(parts, mode="r"))
-    inverse = np.linalg.pinv(corner[:-1, :-1], rcond=1e-12)
-    return inverse @ corner[:-1, -1], np.linalg.norm(inverse, axis=1)
