@@ -12,9 +12,7 @@ from fogml.arrays import FloatArray
 from fogml.gap.cards import Card
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
-from fogml.gap.linear_gaussian import Posterior
-from fogml.gap.model import EffectValue, within_limits
-from fogml.gap.own_simulator import OwnEffect
+from fogml.gap.model import within_limits
 from fogml.gap.posterior import Cause
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Counterfactual, Course
@@ -25,70 +23,12 @@ from fogml.runs.run import Run
 from fogml.signals.noise_expectation import floor_square
 from fogml.twin.draws import parameter_values
 from fogml.twin.effect import Effect, NoiseEffect
-from fogml.twin.nominal import NAMES
 from fogml.twin.plant.fit import PlantFit, fit_plant
 from fogml.twin.registry import effect
 from fogml.twin.twin import Suspected, Twin, Uncertainty
 
 NOT_LINEAR = ("line", "power_cycles", "sensor_steps", "clock_skew")
 """Families that no size moves alone: of a phase of their own, or not in proportion to their size."""
-
-
-def joint_uncertainty(found: Inference, values: Sequence[EffectValue]) -> Uncertainty | None:
-    """Covariance of the nominal constants and of amplitudes and shapes about their values.
-
-    Linear about them, given the noise; amplitudes also by what no form is known more exactly than. None of a
-    laboratory's own simulator.
-    """
-    setting, held, grade = found.setting, found.field, found.scene.grade
-    if tuple(c.name for c in setting.constants) != NAMES:
-        return None
-    names = [f"nominal.{name}" for name in NAMES]
-    scales, columns, extra = list(setting.deviations), [], dict[int, float]()
-    for value in values:
-        declared = found.scene.candidates[value.id]
-        if isinstance(declared, OwnEffect) or declared.drawn_per_run or declared.family == "line":
-            continue
-        _, most = declared.amplitude.range(grade)
-        extra[len(names)] = setting.priors.form_error * value.amplitude
-        names.append(f"effects.{value.id}.amplitude")
-        scales.append(setting.priors.reported.free_amplitude * max(abs(value.amplitude), most))
-        columns.append(held.response(declared, value.shape))
-        for q in declared.shape:
-            low, high = q.range(grade)
-            if high > low:
-                names.append(f"effects.{value.id}.{q.name}")
-                scales.append(0.5 * (high - low))
-                step = setting.priors.reported.shape_step * (high - low)
-                columns.append(_slope(found, declared, value, q.name, step, q.limits))
-    count = len(NAMES)
-    white = np.column_stack([np.empty((len(held.base.data), 0)), *columns]) * np.array(scales[count:])
-    design = np.concatenate([held.fixed, white], axis=1)
-    covariance = Posterior.of(design, held.base.data).covariance
-    kept = [*range(count), *range(held.fixed.shape[1], design.shape[1])]
-    matrix = covariance[np.ix_(kept, kept)] * np.outer(scales, scales)
-    for place, sd in extra.items():
-        matrix[place, place] += sd**2
-    return Uncertainty(tuple(names), matrix)
-
-
-def _slope(
-    found: Inference,
-    declared: Effect,
-    value: EffectValue,
-    name: str,
-    step: float,
-    limits: tuple[float, float],
-) -> FloatArray:
-    """Whitened change of the fit runs with a shape parameter [per its unit], by central differences."""
-    values = found.setting.values
-    ends = [float(np.clip(value.shape[name] + by, *limits)) for by in (-step, step)]
-    width = max(ends[1] - ends[0], 1e-12)
-    changes = []
-    for rows in found.scene.fit:
-        low, high = (rows.response(declared, {**value.shape, name: at}, None, values) for at in ends)
-        changes.append(value.amplitude * (high - low) / width)
-    return found.field.whitening.stacked(changes)
 
 
 def counterfactuals(

@@ -67,12 +67,12 @@ class _Unknown:
         value = middle + spread * unknown
         return math.exp(value) if log else value
 
-    def error(self, unknown: float, error: float) -> float:
-        """Standard error of the value."""
+    def scale(self, unknown: float) -> float:
+        """How far the value moves with the unknown, in the value's unit."""
         if is_angle(self.quantity):
-            return min(math.degrees(error), 180.0)
+            return math.degrees(1.0)
         _, spread, log = self._law
-        return spread * error * (self.value(unknown) if log else 1.0)
+        return spread * (self.value(unknown) if log else 1.0)
 
 
 @dataclass(frozen=True)
@@ -142,9 +142,19 @@ class Form:
         at = self._shape(unknowns)
         shape = {q.name: at[q.name] for q in self.declared.shape}
         shape_se = dict.fromkeys(shape, 0.0)
-        for u, x, error in zip(self.free, unknowns[1:].tolist(), errors[1:].tolist()):
-            shape_se[u.quantity.name] = u.error(x, error)
-        return Fitted(self.usual * float(unknowns[0]), self.usual * float(errors[0]), shape, shape_se)
+        amplitude_se, *others = (errors * self.scales(unknowns)).tolist()
+        for u, error in zip(self.free, others):
+            shape_se[u.quantity.name] = min(error, 180.0) if is_angle(u.quantity) else error
+        return Fitted(self.usual * float(unknowns[0]), amplitude_se, shape, shape_se)
+
+    def scales(self, unknowns: FloatArray) -> FloatArray:
+        """How far amplitude and free shape parameters move with each unknown, in units of the card."""
+        return np.array([self.usual, *(u.scale(x) for u, x in zip(self.free, unknowns[1:].tolist()))])
+
+    @property
+    def names(self) -> list[str]:
+        """Of the free shape parameters."""
+        return [u.quantity.name for u in self.free]
 
     def _shape(self, unknowns: FloatArray) -> dict[str, float]:
         own = {u.quantity.name: u.value(x) for u, x in zip(self.free, unknowns[1:].tolist())}

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fogml.errors import InputError, did_you_mean
-from fogml.gap.better_twin import counterfactuals, joint_uncertainty
+from fogml.gap.better_twin import counterfactuals
 from fogml.gap.cards import cards_of
 from fogml.gap.causes import energy, found_cause
 from fogml.gap.compensation import compensation_of
@@ -212,7 +212,7 @@ def _answer(
     unknown = doubted(Unknown(judged.unknown, looks_like(found, judged)), items)
     verdict = _verdict(named, unknown, judged.nothing < settings.surely_not_nothing)
     shown = () if verdict == "unknown" else items
-    values, constants = fitted_model(found, judged, named, cards)
+    fit = fitted_model(found, judged, named, cards)
     return Diagnosis(
         fit=tuple(r.run.name for r in scene.fit),
         held_out=tuple(r.run.name for r in scene.runs[scene.fitted :]),
@@ -226,11 +226,11 @@ def _answer(
         how_far=far,
         undetectable=tuple(e.effect for e in evidence if e.status in ("undetectable", "in_constants")),
         separating_run=None,
-        constants=constants,
+        constants=fit.constants,
         evidence=evidence,
         noise=noise_of(found, after),
-        effects=values,
-        uncertainty=joint_uncertainty(found, values),
+        effects=fit.effects,
+        uncertainty=fit.uncertainty,
         counterfactuals=counterfactuals(found, after, named, cards) if courses else (),
         series=series_of(found, recalibrated, after),
         unusable=found.unusable,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,11 +16,30 @@ from fogml.gap.model import EffectValue, TwinModel, with_effects
 from fogml.gap.posterior import Cause, Judgement
 from fogml.gap.result import ConstantFit
 from fogml.gap.shapes import AT_AMPLITUDE
+from fogml.twin.nominal import NAMES
+from fogml.twin.twin import Uncertainty
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model with what is named.
+
+    Attributes
+    ----------
+    effects, constants
+        As they go together.
+    uncertainty
+        Of both; none of a laboratory's own simulator.
+    """
+
+    effects: tuple[EffectValue, ...]
+    constants: tuple[ConstantFit, ...]
+    uncertainty: Uncertainty | None
 
 
 def fitted_model(
     found: Inference, judged: Judgement, named: Sequence[Cause], cards: Mapping[str, Card]
-) -> tuple[tuple[EffectValue, ...], tuple[ConstantFit, ...]]:
+) -> Fit:
     """Effects that are named, and the constants, as they go together: a model that has both replays so.
 
     Cards are of each cause beside all that acts, what is unknown, too. No model has that, and constants
@@ -28,66 +47,109 @@ def fitted_model(
     as a replay has them; of one that the model had already it is all of it.
     """
     held, candidates = found.field, found.scene.candidates
-    had = {declared.id: (declared, setting) for declared, setting in found.plant.on}
-    values = {}
-    more = np.zeros(len(held.base.data))
-    for cause in named:
-        id = cause.ids[0]
-        values[id] = cards[id].value
-        if id in had:
-            declared, setting = had[id]
-            own = setting.amplitude * held.response(declared, setting.shape)
-            more += own
-            beside = beside_others(found, judged.best.members, cause)
-            whole = replace(beside, data=beside.data + own)
-            values[id] = card_of(id, held, whole, told_by_family(found, cause)).value
+    whole, more = _of_all(found, judged, named, cards)
+    values = {id: card.value for id, card in whole.items()}
     others = [m for c in named if not in_form(candidates[c.ids[0]]) for m in c.members]
-    base = held.beside(others)
-    data = base.data + more
+    base, design = held.beside(others), held.design(others)
+    base = replace(base, data=base.data + more)
     forms = []
     for id, value in values.items():
         if in_form(declared := candidates[id]):
             # What is not in proportion to its amplitude is taken about it.
             about = {AT_AMPLITUDE: value.amplitude} if declared.amplitudes and value.amplitude else {}
             forms.append(Form(declared, held, value.amplitude, {**value.shape, **about}))
-    design = held.design(others)
     if not forms:
-        return tuple(values.values()), _constants(found, Posterior.of(design, data))
-    best = optimum(forms, Root(replace(base, data=data)))
+        alone = Posterior.of(design, base.data)
+        return _fit(found, whole, values, alone, [], [])
+    best = optimum(forms, Root(base))
     for form, fitted in zip(forms, best.effects):
         values[form.declared.id] = EffectValue(form.declared.id, fitted.amplitude, fitted.shape)
     parts = list(zip(forms, best.unknowns))
-    made = np.sum([form.made(own) for form, own in parts], axis=0)
-    alone = Posterior.of(design, data - made)
+    alone = Posterior.of(design, base.data - np.sum([form.made(own) for form, own in parts], axis=0))
     slopes = np.concatenate([form.slopes(own) for form, own in parts], axis=1)
-    moved = alone.covariance @ (design.T @ slopes)
-    covariance = alone.covariance + moved @ best.covariance @ moved.T
-    told = tuple(values.values())
+    moved = -alone.covariance @ (design.T @ slopes)
+    at = np.cumsum([0, *(len(own) for own in best.unknowns[:-1])])
+    known = found.setting.priors.form_error * np.abs([own[0] for own in best.unknowns])
+    mean, loss = alone.mean, np.zeros((len(design.T), len(forms)))
     if isinstance(found.model, TwinModel):
-        alone = Posterior.of(design, _replayed(found, told, alone.mean))
-    return told, _constants(found, replace(alone, covariance=covariance))
+        mean = _beside(found, design, values, alone.mean)
+        steps = np.hypot(np.sqrt(np.diagonal(best.covariance)[at]), known)
+        for k, (form, step) in enumerate(zip(forms, steps)):
+            value = values[form.declared.id]
+            larger = replace(value, amplitude=value.amplitude + form.usual * float(step))
+            beside = _beside(found, design, values | {value.id: larger}, alone.mean)
+            loss[:, k] = (beside - mean) / step - moved[:, at[k]]
+        moved[:, at] += loss
+    # Constants move with the unknowns; with an error of the form by what is not in proportion to it alone.
+    unknowns = np.eye(slopes.shape[1])
+    with_all, with_form = np.concatenate([moved, unknowns]), known * np.concatenate([loss, unknowns[:, at]])
+    covariance = with_all @ best.covariance @ with_all.T + with_form @ with_form.T
+    covariance[: len(mean), : len(mean)] += alone.covariance
+    return _fit(found, whole, values, Posterior(mean, covariance), forms, best.unknowns)
 
 
-def _replayed(found: Inference, values: Sequence[EffectValue], coefficients: FloatArray) -> FloatArray:
-    """Whitened data that constants alone have to make beside the effects, as a replay has them, shape (n,).
+def _of_all(
+    found: Inference, judged: Judgement, named: Sequence[Cause], cards: Mapping[str, Card]
+) -> tuple[dict[str, Card], FloatArray]:
+    """Cards of all of each effect, and what the model had of them already, whitened, shape (n,)."""
+    held, had = found.field, {declared.id: (declared, setting) for declared, setting in found.plant.on}
+    whole = {cause.ids[0]: cards[cause.ids[0]] for cause in named}
+    more = np.zeros(len(held.base.data))
+    for cause in named:
+        id = cause.ids[0]
+        if id in had:
+            declared, setting = had[id]
+            own = setting.amplitude * held.response(declared, setting.shape)
+            more += own
+            beside = beside_others(found, judged.best.members, cause)
+            data = replace(beside, data=beside.data + own)
+            whole[id] = card_of(id, held, data, told_by_family(found, cause))
+    return whole, more
+
+
+def _fit(
+    found: Inference,
+    cards: Mapping[str, Card],
+    values: Mapping[str, EffectValue],
+    posterior: Posterior,
+    forms: Sequence[Form],
+    unknowns: Sequence[FloatArray],
+) -> Fit:
+    """Coefficients and unknowns in their units."""
+    constants, count = found.setting.constants, len(found.setting.constants)
+    scales = np.concatenate([found.setting.deviations, *map(Form.scales, forms, unknowns)])
+    free = [*range(count), *range(len(posterior.mean), len(posterior.covariance))]
+    own = posterior.covariance[np.ix_(free, free)] * np.outer(scales, scales)
+    errors = np.sqrt(np.maximum(np.diagonal(own), 0.0))
+    fits = tuple(
+        ConstantFit(c.name, c.unit, c.mean, c.sd, float(c.mean + sd * x), float(error))
+        for c, sd, x, error in zip(constants, scales, posterior.mean, errors)
+    )
+    effects = tuple(values.values())
+    if tuple(c.name for c in constants) != NAMES:
+        return Fit(effects, fits, None)
+    names = [f"nominal.{name}" for name in NAMES]
+    for form in forms:
+        id = form.declared.id
+        for name in ("amplitude", *form.names):
+            # What other shapes that fit as well differ by is part of the card's.
+            wide = cards[id].shape_se.get(name, 0.0)
+            own[len(names), len(names)] = max(own[len(names), len(names)], wide**2)
+            names.append(f"effects.{id}.{name}")
+    return Fit(effects, fits, Uncertainty(tuple(names), own))
+
+
+def _beside(
+    found: Inference, design: FloatArray, values: Mapping[str, EffectValue], about: FloatArray
+) -> FloatArray:
+    """Coefficients beside effects as a replay with constants `about` some has them, shape (q,).
 
     Where an effect is not quite in proportion to its size, or meets another constant than it was fitted
     with, constants take up what is left.
     """
     setting, count = found.setting, len(found.setting.constants)
-    at = {
-        c.name: float(c.mean + sd * x)
-        for c, sd, x in zip(setting.constants, setting.deviations, coefficients)
-    }
-    twin = with_effects(found.plant, at, values)
-    left = [r.gap_of(twin) for r in found.scene.fit]
-    return found.field.whitening.stacked(left) + found.field.fixed[:, :count] @ coefficients[:count]
-
-
-def _constants(found: Inference, posterior: Posterior) -> tuple[ConstantFit, ...]:
-    """The constants, before and after."""
-    errors = np.sqrt(np.maximum(np.diagonal(posterior.covariance), 0.0))
-    return tuple(
-        ConstantFit(c.name, c.unit, c.mean, c.sd, float(c.mean + sd * x), float(sd * error))
-        for c, sd, x, error in zip(found.setting.constants, found.setting.deviations, posterior.mean, errors)
-    )
+    at = {c.name: float(c.mean + sd * x) for c, sd, x in zip(setting.constants, setting.deviations, about)}
+    twin = with_effects(found.plant, at, tuple(values.values()))
+    whitening = found.field.whitening
+    left = whitening.stacked([r.gap_of(twin) for r in found.scene.fit])
+    return Posterior.of(design, left + found.field.fixed[:, :count] @ about[:count]).mean

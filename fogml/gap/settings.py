@@ -163,9 +163,6 @@ class Reported:
         one of the gap: one in a hundred.
     shown_share
         Share of the noise floor that an effect of its usual size has to make of some run to be drawn.
-    shape_step, free_amplitude
-        Shapes are moved by this share of their range for a slope; prior standard deviation of an amplitude
-        over its usual most, or its value: as good as free.
     suspected
         A cause is kept in a twin as suspected from this probability on.
     feature_window_s, loop_powers, near_waves
@@ -195,8 +192,6 @@ class Reported:
     bin_degc: float = 10.0
     significant: float = 2.6
     shown_share: float = 0.05
-    shape_step: float = 0.02
-    free_amplitude: float = 10.0
     suspected: float = 0.05
     feature_window_s: float = 64.0
     loop_powers: int = 3

@@ -7,6 +7,7 @@ from fogml.gap import diagnose
 from fogml.gap.model import TwinModel
 from fogml.gap.reading import rows_of
 from fogml.signals.averages import block_averages
+from fogml.twin.draws import moved, parameter_values
 from fogml.twin.programme import load_programme
 from fogml.twin.replay import replay
 from fogml.twin.simulate import simulate
@@ -50,6 +51,18 @@ def test_the_twin_that_is_written_replays_as_well_as_is_said(tmp_path, id, ampli
     )
     rms = float(np.sqrt(np.mean(left.values[0] ** 2)))
     assert rms == pytest.approx(told.after, rel=0.15)
+    truth = parameter_values(twin.with_effect(id, amplitude))
+    for constant in found.constants:
+        assert abs(constant.value - truth[f"nominal.{constant.name}"]) < 4.0 * constant.se
+    # Draws about the twin replay what the runs leave open, and the error of its form.
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        drawn = written
+        for name, by in written.uncertainty.drawn(rng).items():
+            drawn = moved(drawn, name, by)
+        apart = replay(drawn, made[2]) - replay(written, made[2])
+        moves = block_averages(made[2].time, apart, window_s=told.averaging_s).values[0]
+        assert np.sqrt(np.mean(moves**2)) < told.after + 0.05 * told.before
 
 
 def test_a_gap_to_a_twin_is_that_of_the_rows():
