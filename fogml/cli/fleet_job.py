@@ -13,7 +13,7 @@ from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.shared import shared_model
-from fogml.fleet.summary import fleet_json, label_of
+from fogml.fleet.summary import fleet_json, label_of, told_of
 from fogml.fleet.tasks import DONE, FLEET, Task, full_disk
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.locks import sole_writer
@@ -168,7 +168,7 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     rows = []
     for unit in values["units"][:UNITS_SHOWN]:
         label = f"{unit['unit']} {unit['axis']}".strip()
-        told = unit["verdict"].replace("_", " ") or unit["model"] or unit["reason"]
+        told = told_of(unit) or unit["reason"]
         figures = [number(unit[key]) for key in ("before", "after", "floor")]
         rows.append([label, unit["job"], unit["status"], *figures, told])
     heads = ["unit", "job", "status", "rms before", "rms after", "floor", "model or reason"]

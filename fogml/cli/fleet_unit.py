@@ -184,6 +184,8 @@ def check_belong(unit: Unit, runs: Sequence[Run]) -> None:
 
 
 def _told(judgement: Judgement) -> dict[str, Any]:
+    from fogml.validation.advice import advice_on
+
     worst = max(judgement.test, key=lambda run: run.after.rms)
     still = [
         f"the output of {run.run} stands still: {run.still[0]}"
@@ -193,6 +195,7 @@ def _told(judgement: Judgement) -> dict[str, Any]:
     return {
         "model": str(judgement.model["kind"]),
         "met": judgement.met,
+        "verdict": advice_on(judgement).grade,
         "worst": _worst(worst, worst.before.rms, worst.after.rms, worst.outside_training),
         "notes": [str(note) for note in (*still, *judgement.notes, *judgement.model.get("notes", ()))],
     }

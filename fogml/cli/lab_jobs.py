@@ -16,7 +16,7 @@ from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows
-from fogml.report.words import duration
+from fogml.report.words import duration, to_error
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
@@ -182,7 +182,8 @@ def _simulated(settings: NorthSettings) -> dict[str, Any]:
 def _print_north(values: dict[str, Any], terminal: Terminal) -> None:
     se = f" ± {number(values['se'])}" if values["se"] is not None else ""
     if values["kind"] == "recorded":
-        terminal.say(f"{values['source']}: azimuth {values['azimuth_deg']:.5f}{se} deg ({values['method']})")
+        azimuth = to_error(values["azimuth_deg"], values["se"])
+        terminal.say(f"{values['source']}: azimuth {azimuth}{se} deg ({values['method']})")
         drift, drift_se = values["drift_deg_h_per_h"], values["drift_se"]
         if drift is not None:
             terminal.say(f"linear drift {number(drift)} ± {number(drift_se)} deg/h per h")

@@ -13,7 +13,7 @@ from fogml.cli.terminal import Terminal, number, span
 from fogml.errors import InputError
 from fogml.outputs import scratch_folder, whole_file, whole_folder
 from fogml.readers import plain_path
-from fogml.report.words import duration
+from fogml.report.words import duration, lowest_from
 from fogml.runs.columns import header
 from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.noise_of_run import moving_temperatures, noise_report
@@ -287,6 +287,8 @@ def _print_noise(values: dict[str, Any], terminal: Terminal) -> None:
             f"({level} from {number(low)} to {number(high)}), from {floor['source']}"
         )
     minimum = values["minimum"]
-    terminal.say(f"minimum: {number(minimum['adev'])} deg/h at {duration(minimum['tau_s'])}")
+    terminal.say(
+        f"minimum: {number(minimum['adev'])} deg/h at {duration(minimum['tau_s'])}{lowest_from(values)}"
+    )
     for text in (*values["notes"], *(finding["message"] for finding in values["findings"])):
         terminal.say(text)

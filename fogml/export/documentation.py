@@ -166,6 +166,7 @@ def _atoms(plan: Plan) -> list[str]:
         return []
     limits = plan.limits
     lines = ["", "what is made of them, with its trained range"]
+    width = len(str(len(plan.atoms) - 1))
     for i, atom in enumerate(plan.atoms):
         window = ""
         if atom.window is not None:
@@ -173,7 +174,7 @@ def _atoms(plan: Plan) -> list[str]:
                 f" over {atom.window.length_s:g} s" if atom.window.length_s else ""
             )
         low, high = float(limits.box_low[i]), float(limits.box_high[i])
-        lines.append(f"  {i}  {atom.text} [{atom.unit or '1'}]{window}: {low:.9g} to {high:.9g}")
+        lines.append(f"  {i:>{width}}  {atom.text} [{atom.unit or '1'}]{window}: {low:.9g} to {high:.9g}")
     return lines
 
 

@@ -163,7 +163,12 @@ def _why_again(unit: Mapping[str, Any]) -> str:
         return "trained on temperature moving one way only: train on a run that goes up and down"
     if unit["floor"] and unit["after"] > _FLOORS * unit["floor"] and unit["model"] == "mean":
         return "no model beats the mean, and what is left is far above the noise"
-    return ""
+    return "its verdict is 'do not use': its own page says why" if unit["verdict"] == "do_not_use" else ""
+
+
+def told_of(unit: Mapping[str, Any]) -> str:
+    """The verdict on a unit in words, behind the kind of its model."""
+    return ": ".join(filter(None, (unit["model"], unit["verdict"].replace("_", " "))))
 
 
 def _constants(outcomes: Sequence[Mapping[str, Any]]) -> tuple[list[str], FleetConstants] | None:

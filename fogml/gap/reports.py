@@ -235,7 +235,7 @@ def headline(
         for n in [n for n in nearest if n.effect not in {f.effect for f in shown if f.named}][:2]:
             if n.share >= found.setting.priors.reported.near_share:
                 said.append(
-                    f"Nearest known cause: {titles[n.effect].title.lower()}, in whatever form, holds "
+                    f"Nearest known cause: {titles[n.effect].title}, in whatever form, holds "
                     f"{n.share:.0%} of the gap."
                 )
     runs = [found.scene.runs[i].run.name for i in found.scene.in_time]

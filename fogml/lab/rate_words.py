@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from fogml.lab.rate_response import HALF_POWER
+
 Number = Callable[[float | None], str]
 
 
@@ -85,7 +87,11 @@ def _response(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
         between = number(band["half_power_hz"])
         remark = "gain 0.707, between the frequencies tested"
         if band["half_power_hz"] is None:
-            between, remark = "–", "the gain does not fall to 0.707, or is below from the first frequency on"
+            scale = (values["scale_factor"] or {"scale_factor": 1.0})["scale_factor"]
+            gains = sorted((one["frequency_hz"], one["gain"]) for one in values["gains"])
+            low = gains[0][1] < HALF_POWER * scale
+            between = f"< {number(gains[0][0])}" if low else f"> {number(gains[-1][0])}"
+            remark = "gain 0.707 lies beyond the frequencies tested"
         rows.append(ResultRow("bandwidth", between, "", "Hz", remark))
         if band["first_order_hz"] is not None:
             first = number(band["first_order_hz"])

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Self
 
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
+from fogml.errors import InputError, counted
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import refusals
@@ -96,9 +96,9 @@ class AutoModel(DriftModel):
         weighed = self.features is None
         if weighed and trial.one_rate:
             notes.append(
-                f"at most temperatures the training runs hold {trial.rates} distinct rate(s), which don't "
-                "tell how the drift depends on the rate: what is weighed is linear in it; train at three or "
-                "more rates to allow other forms"
+                "at most temperatures the training runs hold "
+                f"{counted(trial.rates, 'rate')} of temperature, too few to tell how the drift goes with it: "
+                "what is weighed is linear in the rate; train at three or more rates to allow other forms"
             )
         elif weighed and trial.both_directions and not trial.direction_told:
             notes.append(

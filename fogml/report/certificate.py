@@ -123,7 +123,7 @@ def _sheet(judgement: Judgement) -> Sheet:
         *([("Trained within", card["trained within"])] if "trained within" in card else []),
         ("Trained on", listed([run.run for run in judgement.train], 6)),
         ("Attitude", _attitude(worst)),
-        ("Span", _span(worst)),
+        ("Judged on" if len(judgement.test) == 1 else "Worst run", _span(worst)),
         ("Rates", _rates(worst)),
         ("Averages", f"{worst.averaging_s:.4g} s"),
         ("Bias relative to", reference_of(worst)),

@@ -12,7 +12,7 @@ from fogml.arrays import FloatArray
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
-from fogml.report.words import number
+from fogml.report.words import lowest_from, number
 
 TERM_WORDS = {
     "Q": "quantisation",
@@ -108,7 +108,11 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
         caption=(
             "Lines without markers: each term alone, at the value in the table. "
             + shown
-            + (" Star: the lowest deviation that enough averages support." if lowest else "")
+            + (
+                f" Star: the lowest deviation that enough averages support{lowest_from(noise)}."
+                if lowest
+                else ""
+            )
         ),
     )
 

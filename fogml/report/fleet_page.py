@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 import plotly.graph_objects as go
 
-from fogml.fleet.summary import in_order_of_serial, label_of
+from fogml.fleet.summary import in_order_of_serial, label_of, told_of
 from fogml.fleet.tasks import DONE
 from fogml.report import style
 from fogml.report.figures_fleet import by_unit, constants, distribution
@@ -145,7 +145,7 @@ def _trends(fleet: Mapping[str, Any]) -> Table:
 def _table(order: list[Mapping[str, Any]]) -> Table:
     rows = []
     for unit in order:
-        told = unit["reason"] or unit["verdict"].replace("_", " ") or unit["model"]
+        told = unit["reason"] or told_of(unit)
         if unit["effects"]:
             told += f": {', '.join(unit['effects'])}"
         rows.append(

@@ -26,7 +26,10 @@ def nearest_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     return Table(
         columns=columns_of("Known cause | >Of the fit runs' gap | >Probability"),
         rows=rows,
-        caption="What each holds alone, in whatever form its family has: it is no name.",
+        caption=(
+            "What each holds alone, in whatever form its family has: it is no name. Probability: as the fits "
+            "weigh it; a name's is lower, as no form is quite known."
+        ),
     )
 
 

@@ -176,7 +176,7 @@ def error_sentences(found: Diagnosis) -> list[str]:
     """How often such findings were right on cases whose truth is known; first what was checked."""
     rates = _held()
     figures, cases = rates["figures"], rates["cases"]
-    realities = listed([f"the {name} one" for name in cases])
+    realities = listed(list(cases))
     what = "synthetic case" if rates["final"] else "development case"
     told = [
         f"Checked on {plural(sum(cases.values()), what)} with their truth withheld, of "

@@ -56,9 +56,12 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
         ),
         Tile(
             "Zero error of the fixture",
-            f"{number(values['fixture_error_deg'][0])}, {number(values['fixture_error_deg'][1])}",
+            ", ".join(
+                number(error).replace(" ", "\N{NO-BREAK SPACE}") for error in values["fixture_error_deg"]
+            ),
             "deg",
             "states 1 and 2; 3 and 4",
+            "words",
         ),
     ]
 

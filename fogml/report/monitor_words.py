@@ -156,7 +156,7 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
                     row=row,
                     col=1,
                 )
-    figure.update_xaxes(title_text=_age_title(unit), row=len(told), col=1)
+    figure.update_xaxes(**_age_axis(unit), row=len(told), col=1)
     style.styled(figure, 90 + 150 * len(told))
     changes = "; ".join(f"{FIGURE_WORDS[a['figure']]} since {onset_words(a)}" for a in unit["alarms"])
     return Drawing(
@@ -213,7 +213,7 @@ def evidence(unit: Mapping[str, Any], limit: float) -> Drawing:
         line={"color": style.VERMILION, "dash": "dash", "width": 1.5},
     )
     figure.update_yaxes(title_text="evidence, logarithmic", **log_axis(min(values), max(*values, 2 * limit)))
-    figure.update_xaxes(title_text=_age_title(unit))
+    figure.update_xaxes(**_age_axis(unit))
     style.styled(figure, 300)
     return Drawing(
         figure,
@@ -259,5 +259,8 @@ def levels(units: Sequence[Mapping[str, Any]]) -> Drawing:
     )
 
 
-def _age_title(unit: Mapping[str, Any]) -> str:
-    return "days since the first run" if unit["age_unit"] == "d" else "run number"
+def _age_axis(unit: Mapping[str, Any]) -> dict[str, Any]:
+    if unit["age_unit"] == "d":
+        return {"title_text": "days since the first run"}
+    # A tick at every run where there are few: there is nothing between two runs.
+    return {"title_text": "runs since the first", "dtick": max(1, len(unit["age"]) // 10)}

@@ -8,7 +8,7 @@ from typing import Any
 from fogml.report.figures_noise import TERM_WORDS, allan_plot
 from fogml.report.page import Tile, render
 from fogml.report.tables import Table, columns_of, noticed
-from fogml.report.words import MISSING, duration, number
+from fogml.report.words import MISSING, duration, lowest_from, number
 
 _UNITS = {
     "urad": "µrad",
@@ -58,6 +58,7 @@ def _verdict(noise: Mapping[str, Any]) -> str:
     if minimum.get("adev"):
         parts.append(
             f"a lowest Allan deviation of {number(minimum['adev'])} deg/h at {number(minimum['tau_s'])} s"
+            + lowest_from(noise)
         )
     if not parts:
         return "The data support no noise term."
@@ -86,7 +87,7 @@ def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
                 "Minimum",
                 number(minimum["adev"]),
                 "deg/h",
-                f"at {number(minimum['tau_s'])} s",
+                f"at {number(minimum['tau_s'])} s{lowest_from(noise)}",
             )
         )
     return tiles

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import Row, Table, columns_of, noticed
-from fogml.report.words import MISSING, duration, listed, number, stated
+from fogml.report.words import MISSING, duration, listed, number, stated, to_error
 
 
 def north_page(values: Mapping[str, Any]) -> str:
@@ -39,7 +39,7 @@ def north_page(values: Mapping[str, Any]) -> str:
 
 def _recorded_verdict(values: Mapping[str, Any]) -> list[str]:
     within = f" ± {number(values['se'], 2)}" if values["se"] is not None else ""
-    sentences = [f"The azimuth is {values['azimuth_deg']:.4f}{within} deg."]
+    sentences = [f"The azimuth is {to_error(values['azimuth_deg'], values['se'])}{within} deg."]
     drift = values["drift_deg_h_per_h"]
     if values["method"] != "plain":
         bent = ", and its bend," if values["method"] == "bend-observing" else ""
@@ -74,7 +74,7 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
     tiles = [
         Tile(
             "Azimuth found",
-            f"{values['azimuth_deg']:.4f}",
+            to_error(values["azimuth_deg"], values["se"]),
             "deg",
             values.get("method", values.get("way", "")),
         ),

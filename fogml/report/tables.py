@@ -233,7 +233,10 @@ def candidates_table(model: Mapping[str, Any]) -> Table | None:
             (str(told["name"]), str(told["parameters"]), number(float(told["held_out_rms"])))
             for told in candidates
         ),
-        caption="On parts left out of training in turn; a larger one is taken only if better beyond noise.",
+        caption=(
+            "Simple forms, on blocks of the training runs left out in turn; a larger one is taken only if "
+            "better beyond noise. What a combination leaves is of other parts left out, and told above."
+        ),
     )
 
 

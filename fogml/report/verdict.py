@@ -199,7 +199,7 @@ def model_card(model: dict[str, Any], most: int | None = None) -> list[tuple[str
         rows.append(("parameters", f"{parameters:,}".replace(",", "\u202f")))
     if model.get("bytes") is not None:
         rows.append(("weights", plural(int(model["bytes"]), "byte")))
-    for key, words, unit in (("window_s", "longest look-back", " s"), ("rows", "training rows", "")):
+    for key, words, unit in (("window_s", "longest window", " s"), ("rows", "training rows", "")):
         if model.get(key):
             rows.append((words, f"{number(float(model[key]), 4) if unit else int(model[key])}{unit}"))
     for key in ("unit", "axis"):
@@ -215,7 +215,8 @@ def model_card(model: dict[str, Any], most: int | None = None) -> list[tuple[str
     if interval.get("half_width_90") is not None:
         rows.append(("90 % band", interval_words(interval)))
     if model.get("chosen_by"):
-        rows.append(("chosen by", f"{model['chosen_by']}, among those below"))
+        among = "mixed effects and simple forms" if model.get("kind") == "combination" else "those below"
+        rows.append(("chosen by", f"{model['chosen_by']}, among {among}"))
     return rows
 
 

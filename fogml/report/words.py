@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 _LABELS = {
     "bias": "Bias",
@@ -62,6 +63,12 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
 
 
+def to_error(value: float, error: float | None, most: int = 4) -> str:
+    """A number to the second digit of its standard error, but with at most so many decimals."""
+    decimals = max(1 - math.floor(math.log10(error)), 0) if error else most
+    return f"{value:.{min(decimals, most)}f}".replace("-", "−")
+
+
 def stated(value: float) -> str:
     """A number that somebody stated, such as a limit, as they would write it."""
     return f"{value:.10g}".replace("-", "−")
@@ -75,7 +82,16 @@ def percent(share: float | None) -> str:
         return "under 0.1 %"
     if 0.999 < share < 1:
         return "over 99.9 %"
-    return f"{100 * share:.1f} %" if share not in (0, 1) else f"{100 * share:.0f} %"
+    return f"{100 * share:.{0 if share in (0, 1) else 1}f} %".replace("-", "−")
+
+
+def lowest_from(noise: Mapping[str, Any]) -> str:
+    """From what time on the minimum of a ``noise.json`` is looked for; empty where none before is lower."""
+    lowest = noise["minimum"]
+    before = [value for tau, value in zip(noise["taus_s"], noise["adev"]) if tau < lowest["tau_s"]]
+    if min(before, default=lowest["adev"]) >= lowest["adev"]:
+        return ""
+    return f" (of times from {number(noise.get('holds_from_s'))} s on, where the terms hold)"
 
 
 def plural(count: int, word: str, words: str | None = None) -> str:

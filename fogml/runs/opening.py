@@ -81,10 +81,15 @@ def file_format(path: Path) -> str:
     raise InputError(f"{path.name}: is a {reader.label} file by its content, and named as {label}; {do}")
 
 
+def _of_shipped(path: Path) -> str:
+    name = str(path).removeprefix("shipped:")
+    return "" if name == str(path) else f"; in Python a recording that ships is fogml.shipped_run('{name}')"
+
+
 def _format_of_content(path: Path) -> str:
     try:
         if not path.exists():
-            raise InputError(f"{path}: no such file{with_slashes(path)}")
+            raise InputError(f"{path}: no such file{with_slashes(path)}{_of_shipped(path)}")
         if path.is_dir() and (path / "metadata.yaml").is_file():
             raise InputError(f"{path}: is the folder of a ROS 2 bag; name its .db3 or .mcap file")
         if path.is_dir():

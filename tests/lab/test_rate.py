@@ -15,6 +15,7 @@ from fogml.lab.rate_json import rate_json, unit_facts
 from fogml.lab.rate_pieces import find_oscillations, find_plateaus, merged
 from fogml.lab.rate_programmes import rate_runs
 from fogml.lab.rate_response import bandwidth, gain_of
+from fogml.lab.rate_words import result_rows
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.twin.optics import Coil
@@ -174,6 +175,15 @@ def test_gain_of_a_delayed_wave_by_hand() -> None:
     assert found.gain == pytest.approx(0.8, rel=1e-3)
     assert found.phase_deg == pytest.approx(-math.degrees(0.3), abs=0.05)
     assert bandwidth([found]) is None
+
+
+@pytest.mark.parametrize(("gains", "told"), [((1.0, 0.9), "> 300"), ((0.6, 0.3), "< 100")])
+def test_a_bandwidth_beyond_the_frequencies_tested_says_on_which_side(gains, told) -> None:
+    values = rate_json([by_hand(np.array([0.0, 10.0, -10.0, 0.0]))], source="table")
+    values["gains"] = [{"frequency_hz": f, "gain": g} for f, g in zip((100.0, 300.0), gains)]
+    values["bandwidth"] = {"half_power_hz": None, "first_order_hz": None}
+    (row,) = (row for row in result_rows(values, lambda x: f"{x:g}") if row.quantity == "bandwidth")
+    assert row.value == told
 
 
 def test_turns_to_and_fro_are_no_oscillation() -> None:

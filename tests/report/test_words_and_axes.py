@@ -55,6 +55,18 @@ def test_a_share_that_is_not_zero_is_not_shown_as_zero() -> None:
     assert words.percent(1e-5) == "under 0.1 %"
     assert words.percent(0.99999) == "over 99.9 %"
     assert words.percent(0.123) == "12.3 %"
+    assert words.percent(-1.612) == "−161.2 %"
+
+
+def test_a_value_ends_with_the_second_digit_of_its_error() -> None:
+    told = [words.to_error(359.73304, error) for error in (1.07, 0.0312, 1e-7, None)]
+    assert told == ["359.7", "359.733", "359.7330", "359.7330"]
+
+
+def test_a_minimum_that_is_not_the_lowest_point_says_from_where_on_it_is() -> None:
+    noise = {"taus_s": [1, 10, 100], "adev": [3.0, 1.0, 2.0], "holds_from_s": 100.0}
+    assert "100 s on" in words.lowest_from({**noise, "minimum": {"adev": 2.0, "tau_s": 100}})
+    assert not words.lowest_from({**noise, "minimum": {"adev": 1.0, "tau_s": 10}})
 
 
 def test_lists_of_names() -> None:

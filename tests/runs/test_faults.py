@@ -223,6 +223,8 @@ def test_text_in_parquet(tmp_path):
 
 
 def test_no_file_and_a_folder(tmp_path):
+    with pytest.raises(InputError, match=r"shipped_run\('ring-laser-z'\)"):
+        read_run("shipped:ring-laser-z")
     with pytest.raises(InputError, match=r"none\.csv: no such file"):
         read_run(tmp_path / "none.csv")
     for folder in (tmp_path, "/"):
