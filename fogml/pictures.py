@@ -41,6 +41,9 @@ class Pictured:
         """What is drawn, from the top."""
         raise NotImplementedError
 
+    def __str__(self) -> str:
+        return "\n".join(str(line) for line in self._heading() if line)
+
     def _repr_html_(self) -> str:
         head, *lines = self._heading()
         panels = self._panels()

@@ -159,6 +159,8 @@ class DriftModel(BaseEstimator, ABC):
             If the run lacks what the features need, or the drift is not finite at some sample.
         """
         self._check_fitted()
+        if not isinstance(run, Run):
+            raise InputError(f"one run is needed, found {type(run).__name__}; call it for each run")
         if self.features_ is None:
             everywhere = np.ones(len(run), dtype=np.bool_)
             return self.evaluate_from(run, AtomValues(np.empty((len(run), 0)), everywhere, everywhere))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from operator import attrgetter
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, with_config
@@ -130,6 +131,26 @@ def hash_ahead(runs: Sequence[Run]) -> Callable[[], list[str]]:
     return lambda: [hash_of.result() for hash_of in pending]
 
 
+def runs_of(given: Run | Sequence[Run]) -> tuple[Run, ...]:
+    """One run or several as a tuple.
+
+    Raises
+    ------
+    InputError
+        If something is no run, as a table or the name of a file.
+    """
+    found: Any = given
+    one = isinstance(found, str | Path) or hasattr(found, "columns") or not isinstance(found, Iterable)
+    group: tuple[Any, ...] = (found,) if one else tuple(found)
+    for run in group:
+        if not isinstance(run, Run):
+            raise InputError(
+                f"runs are needed, found {type(run).__name__}; fogml.read_run makes one of a file, "
+                "fogml.Run.from_pandas of a table"
+            )
+    return group
+
+
 def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
     """Training runs as a tuple, of one unit and axis, and either all or none with known Earth rate.
 
@@ -138,12 +159,10 @@ def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
     InputError
         If there is none, one is empty, or they don't belong together.
     """
-    group = (runs,) if isinstance(runs, Run) else tuple(runs)
+    group = runs_of(runs)
     if not group:
         raise InputError("no training run is given; name at least one")
     for run in group:
-        if not isinstance(run, Run):
-            raise InputError(f"a model is fitted to runs, found {type(run).__name__}")
         if len(run) == 0:
             raise InputError(f"{run.name}: holds no samples; leave it out of training")
     for fact in ("unit", "axis"):

@@ -13,6 +13,7 @@ FIRST_OF_ALL = (
     "already_compensated",
     "implausible_temperature",
     "thermometers_apart",
+    "implausible_clock",
     "implausible_earth_rate",
     "implausible_scale_factor",
     "temperature_dropouts",
@@ -23,6 +24,7 @@ IMPLAUSIBLE = {
     "already_compensated": "the output",
     "implausible_temperature": "the temperature",
     "thermometers_apart": "the temperature",
+    "implausible_clock": "the clock",
     "implausible_earth_rate": "the output or the attitude",
     "implausible_scale_factor": "the output or the table's rate",
 }

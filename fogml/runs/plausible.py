@@ -6,7 +6,7 @@ Each is said before anything else, as every figure after it would be wrong.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import permutations
+from itertools import pairwise, permutations
 
 import numpy as np
 
@@ -63,6 +63,14 @@ HOTTER_DEGC = 30.0
 FAHRENHEIT_SPANS = (1.5, 2.1)
 """Spans of two thermometers of one set-up have a ratio within these if one reads Fahrenheit: 1.8, but for
 lags and heat that changes; without, about 1."""
+FASTEST_DEGC_PER_MIN = 60.0
+"""No chamber takes a gyro faster over `FAR_DEGC`: air of shock chambers changes by up to 50 degC/min."""
+FAR_DEGC = 10.0
+"""A thermometer's noise and a bad contact move means of parts of a run by less than this [degC]."""
+SPREADSHEET_DAYS = (36526.0, 73050.0)
+"""Days as spreadsheets count them, of the years 2000 to 2099."""
+DAY_S = 86400.0
+_PARTS = 64
 _ENDS = (0.02, 0.98)
 Ends = tuple[float, float]
 
@@ -76,6 +84,9 @@ def implausible(run: Run) -> Iterator[Finding]:
         A temperature whose numbers are those of another unit: kelvin, Fahrenheit or raw counts.
     ``thermometers_apart``
         The means of two thermometers differ by more than 80 degC.
+    ``implausible_clock``
+        A temperature moves faster than any chamber takes a gyro, or the times of a fast logger are those of
+        a spreadsheet's days.
     ``implausible_earth_rate``
         Earth rate is known, and the mean at rest is that with the other sign, or in another unit.
     ``implausible_scale_factor``
@@ -90,6 +101,7 @@ def implausible(run: Run) -> Iterator[Finding]:
     found = list(_thermometers(run, others))
     yield from found
     yield from () if found else _hot(run, others)
+    yield from _clock(run, others)
     try:
         gyro = run.gyro_deg_h
     except InputError:
@@ -175,6 +187,34 @@ def _hot(run: Run, names: Sequence[str]) -> Iterator[Finding]:
                 "Fahrenheit? Write its header with [degF]; if it was so hot, nothing is to be done"
             )
             yield Finding("implausible_temperature", message, column=name, count=len(run))
+
+
+def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
+    """A clock in minutes, hours or days under a header with [s]."""
+    time = run.time
+    if SPREADSHEET_DAYS[0] <= time[0] and time[-1] <= SPREADSHEET_DAYS[1] and run.sample_s < 60.0 / DAY_S:
+        told = (
+            f"the times, {time[0]:.10g} to {time[-1]:.10g} s, are days as a spreadsheet counts them, "
+            f"one sample in {DAY_S * run.sample_s:.3g} s: write the header as 'time [d]'; if samples are "
+            f"{run.sample_s:.3g} s apart, nothing is to be done"
+        )
+        yield Finding("implausible_clock", told, column="time", count=len(run))
+        return
+    edges = np.linspace(0, len(run), min(_PARTS, len(run) // 2) + 1).astype(int)
+    spans = list(pairwise(edges))
+    middle = np.array([time[a:b].mean() for a, b in spans])
+    for name in names:
+        means = np.array([run.columns[name][a:b].mean() for a, b in spans])
+        moved, within_s = np.abs(np.diff(means)), np.diff(middle)
+        fast = moved > FASTEST_DEGC_PER_MIN / 60.0 * within_s
+        if moved[fast].sum() >= FAR_DEGC:
+            told = (
+                f"'{name}' moves by {moved[fast].sum():.3g} degC in {within_s[fast].sum():.3g} s in all, "
+                "faster than a chamber takes a gyro: is the clock in minutes, hours or days? Write "
+                "its header as 'time [min]', 'time [h]' or 'time [d]'"
+            )
+            yield Finding("implausible_clock", told, column="time", count=len(run))
+            return
 
 
 def _most_apart(columns: Sequence[FloatArray]) -> float:

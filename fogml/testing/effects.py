@@ -114,7 +114,7 @@ SMOOTHNESS = 0.05
 """Greatest relative change of a slope against a shape parameter when the step is halved."""
 
 
-def check_effect(effect: Effect | type[Effect]) -> None:
+def check_effect(effect: Effect | type[Effect] | str) -> None:
     """Check that an effect keeps the contract that simulator, diagnosis and documentation rely on.
 
     The checks: the declaration is whole, with units, ranges, priors, equation and source; the
@@ -128,14 +128,15 @@ def check_effect(effect: Effect | type[Effect]) -> None:
     Parameters
     ----------
     effect
-        An effect or its class.
+        An effect, its class, or the id of one that is registered.
 
     Raises
     ------
     AssertionError
         Naming the part of the contract that is not kept.
     """
-    checked: Effect = effect() if isinstance(effect, type) else effect
+    known = registry.effect(effect) if isinstance(effect, str) else effect
+    checked: Effect = known() if isinstance(known, type) else known
     inputs = standard_inputs()
     check_declaration(checked)
     check_priors(checked)

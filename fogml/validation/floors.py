@@ -164,6 +164,5 @@ def out_of_reach(
         return None
     return (
         f"No model can reach the design index of {index:g} deg/h: the noise alone leaves {floor:.3g} deg/h "
-        f"rms in averages over {averaging_s:g} s of {where} (as {count} of them go, {low:.3g} to {high:.3g}, "
-        f"{LEVEL:.0%})"
+        f"rms ({low:.3g} to {high:.3g}, {LEVEL:.0%}) in {count} averages over {averaging_s:g} s of {where}"
     )

@@ -17,6 +17,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import FogmlError, InputError, counted
+from fogml.models.card import runs_of
 from fogml.models.table import usable_rows
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S, block_averages
@@ -152,7 +153,7 @@ def train_until_index(
     InputError
         If no candidate can be fitted.
     """
-    group = [runs] if isinstance(runs, Run) else list(runs)
+    group = runs_of(runs)
     beyond = _out_of_reach(group, design_index, averaging_s)
     if beyond is not None:
         if step is not None:

@@ -10,6 +10,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.base import NOT_FULL, OUTSIDE
+from fogml.models.card import runs_of
 from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
@@ -83,8 +84,7 @@ def judge(
         For a limit that is unknown or that no test run tells, for a run of another unit or axis,
         and for a run too short for two averages.
     """
-    train = [train_runs] if isinstance(train_runs, Run) else list(train_runs)
-    test = [test_runs] if isinstance(test_runs, Run) else list(test_runs)
+    train, test = runs_of(train_runs), runs_of(test_runs)
     if not train or not test:
         raise InputError("a judgement needs at least one training run and one test run")
     limits = check_limits(limits or {})

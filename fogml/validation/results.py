@@ -193,7 +193,7 @@ class Judgement(Pictured):
             f"{run.run}: rms {run.before.rms:.3g} → {run.after.rms:.3g} deg/h, noise floor {run.floor:.3g}"
             for run in self.test
         ]
-        return [f"{self.model['kind']}, judged on runs it was not trained on", *lines]
+        return [f"{self.model['kind']}, judged", *lines]
 
     def _panels(self) -> Sequence[Panel]:
         panels = []

@@ -17,6 +17,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.testing import check_model
 from fogml.testing.models import synthetic_run
+from fogml.validation.judge import judge
 
 PLAIN = ["none", "mean", "polynomial", *PRESETS]
 
@@ -226,3 +227,20 @@ def test_notes_on_use(train, other):
     assert any("the model states no unit" in note for note in notes)
     assert any("Earth rate" in note for note in notes)
     assert make_model("polynomial").fit(train).check_applies(other) == ()
+
+
+def test_what_is_no_run_is_told_as_that() -> None:
+    time = 2.0 * np.arange(1500)
+    warm = 20.0 - 20.0 * np.cos(time / 500.0)
+    run = Run("a", {"time": time, "gyro": 5.0 + 0.05 * warm + np.sin(time), "T": warm})
+    model = make_model("polynomial", "T").fit(run)
+    calls = (
+        lambda: model.fit(run.to_pandas()),
+        lambda: model.fit(["a.csv"]),
+        lambda: judge(model, "a.csv", run),
+        lambda: model.predict([run]),
+    )
+    for call, found in zip(calls, ("DataFrame", "str", "str", "list"), strict=True):
+        with pytest.raises(InputError, match=rf"needed, found {found}"):
+            call()
+    assert str(judge(model, run, run)).startswith("polynomial, judged\na: rms")

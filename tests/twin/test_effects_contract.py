@@ -10,7 +10,7 @@ from fogml.twin.registry import effects
 
 @pytest.mark.parametrize("id", list(effects()))
 def test_effect_keeps_the_contract(id: str) -> None:
-    check_effect(effects()[id])
+    check_effect(id)
 
 
 @pytest.mark.parametrize("id", list(effects()))
