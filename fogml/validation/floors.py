@@ -11,7 +11,7 @@ from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
 from fogml.runs.noise_of_run import moving_temperatures
-from fogml.runs.noise_series import rows_at_rest
+from fogml.runs.noise_series import rows_at_rest, sample_interval
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import thermal_columns
 from fogml.signals import large
@@ -40,7 +40,7 @@ def floor_of_run(
     noise
         A static run of the unit.
     """
-    windows = max(int(np.count_nonzero(used) * run.sample_s / averaging_s), 2)
+    windows = max(int(np.count_nonzero(used) * _interval_s(run) / averaging_s), 2)
     if noise is not None:
         still = rows_at_rest(noise)
         found = _model(noise, still, noise.error_deg_h, averaging_s, static=True)
@@ -58,13 +58,13 @@ def floors_over(run: Run, averaging_s: float, times_s: Sequence[float]) -> list[
     averages, or turns throughout.
     """
     still = rows_at_rest(run)
-    rows = int(np.count_nonzero(still))
-    if rows * run.sample_s < 2.0 * averaging_s:
+    recorded_s = np.count_nonzero(still) * _interval_s(run)
+    if recorded_s < 2.0 * averaging_s:
         return []
     found = _model(run, still, run.error_deg_h, averaging_s)
     if found is None:
         return []
-    return [found.floor(time_s, max(int(rows * run.sample_s / time_s), 2)) for time_s in times_s]
+    return [found.floor(time_s, max(int(recorded_s / time_s), 2)) for time_s in times_s]
 
 
 def check_noise_run(noise: Run) -> None:
@@ -95,10 +95,15 @@ def _model(
         # Without a temperature nobody knows whether a slow change is the gyro's own.
         drifts = moves or (not static and not run.temperature_columns)
         kept[key] = floor_model(
-            large.chosen(error_deg_h, used), run.sample_s, averaging_s, starts, stops, columns, drifts=drifts
+            large.chosen(error_deg_h, used), _interval_s(run), averaging_s, starts, stops, columns, drifts=drifts
         )
     found: FloorModel | None = kept[key]
     return found
+
+
+def _interval_s(run: Run) -> float:
+    """Time that a sample stands for [s]: averages over a time hold fewer of them where some are lost."""
+    return sample_interval(run, run.stretches)
 
 
 def _at_rows(run: Run, rows: IntArray) -> Columns:

@@ -168,3 +168,17 @@ def test_the_floor_is_the_noise_and_not_the_drift():
     test = replace(train.with_columns(gyro=train.gyro + noise), name="b.csv")
     (run,) = judge(KnownDrift().fit(train), train, test).test
     assert run.floor == pytest.approx(0.2, rel=0.1)
+
+
+def test_the_floor_counts_the_samples_that_averages_hold():
+    """Four in ten samples lost at random: 2 / sqrt(60) is left in averages over 100 s, and they scatter so."""
+    train = ramp_run("a.csv", 0.0, n=40_000)
+    rng = np.random.default_rng(6)
+    noise = rng.normal(scale=2.0, size=len(train))
+    test = replace(train.with_columns(gyro=train.gyro + noise)[rng.random(len(train)) < 0.6], name="b.csv")
+    for judged in (
+        judge(KnownDrift(slope_law).fit(train), train, test).test[0],
+        judge(KnownDrift(slope_law).fit(train), train, test, noise=test).test[0],
+    ):
+        assert judged.after.bias_stability == pytest.approx(2.0 / np.sqrt(60.0), rel=0.1)
+        assert judged.floor == pytest.approx(2.0 / np.sqrt(60.0), rel=0.06)
