@@ -24,7 +24,9 @@ from fogml.signals.restricted import absent_or_not, weighed_models
 from fogml.signals.whitening import Whitener
 
 _GAP = 1.5
-"""Steps longer than this many usual ones part a run."""
+"""Steps longer than this many usual ones part a run, or tell lost rows."""
+_MOST_LOST = 0.5
+"""Share of a run's rows from which on rows that are followed by longer steps are its usual ones."""
 _FEWEST = 8
 """Degrees of freedom that columns must leave for a noise to be told."""
 _LIGHT = 1e-4
@@ -62,11 +64,25 @@ class RowNoise:
 
 
 def stretches_of(table: TrainingTable) -> tuple[list[slice], float]:
-    """Rows of one run without a gap each, and the usual step [s]."""
-    steps = np.diff(table.time_s)
+    """Rows of one run without a gap each, and the time that a row stands for [s].
+
+    Rows that a run lost at random make no gap: of n rows of which a share p is followed by lost ones, chance
+    makes at most about ln(n) / ln(1 / p) in a row. Those that are left stand for their time too.
+    """
     inside = np.diff(table.run_index) == 0
-    step_s = float(np.median(steps[inside])) if np.any(inside) else 1.0
-    cuts = np.flatnonzero(~inside | (steps > _GAP * step_s)) + 1
+    if not np.any(inside):
+        return [slice(i, i + 1) for i in range(len(table))], 1.0
+    step_s = float(np.median(np.diff(table.time_s)[inside]))
+    steps, run = np.diff(table.time_s) / step_s, table.run_index[1:]
+    count = np.bincount(run, inside)
+    lost = np.bincount(run, inside & (steps > _GAP)) / np.maximum(count, 1.0)
+    # A run of other steps than most has lost nothing.
+    told = (lost > 0.0) & (lost < _MOST_LOST)
+    longest = np.full(len(lost), _GAP)
+    longest[told] -= np.log(count[told]) / np.log(lost[told])
+    joined = inside & (steps <= longest[run])
+    step_s *= float(np.mean(np.maximum(np.rint(steps[joined]), 1.0))) if np.any(joined) else 1.0
+    cuts = np.flatnonzero(~joined) + 1
     return [slice(int(p[0]), int(p[-1]) + 1) for p in np.split(np.arange(len(table)), cuts)], step_s
 
 

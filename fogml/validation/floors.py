@@ -95,7 +95,13 @@ def _model(
         # Without a temperature nobody knows whether a slow change is the gyro's own.
         drifts = moves or (not static and not run.temperature_columns)
         kept[key] = floor_model(
-            large.chosen(error_deg_h, used), _interval_s(run), averaging_s, starts, stops, columns, drifts=drifts
+            large.chosen(error_deg_h, used),
+            _interval_s(run),
+            averaging_s,
+            starts,
+            stops,
+            columns,
+            drifts=drifts,
         )
     found: FloorModel | None = kept[key]
     return found

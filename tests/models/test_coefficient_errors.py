@@ -7,8 +7,8 @@ import pytest
 
 from fogml.models.joint import JointModel
 from fogml.models.linear import LinearRegressor
-from fogml.models.row_noise import noise_covariance
-from fogml.models.table import RunRows
+from fogml.models.row_noise import noise_covariance, stretches_of
+from fogml.models.table import RunRows, TrainingTable
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.signals.flicker import Flicker
@@ -68,16 +68,35 @@ def test_runs_stretches_and_a_ridge() -> None:
     assert noise_covariance(short, lambda atoms: atoms, whole) is None
 
 
-def test_dropped_rows_hide_no_slow_noise() -> None:
-    rng = np.random.default_rng(4)
-    y = COLUMNS @ TRUE[1:] + 0.05 * np.cumsum(rng.normal(size=N)) + rng.normal(size=N)
-    model = LinearRegressor().fit(COLUMNS, y)
-    kept = rng.random(N) > 0.03
-    whole, dropped = (
-        np.sqrt(np.diag(noise_covariance([RunRows(COLUMNS[k], y[k], TIME[k])], lambda atoms: atoms, model)))
-        for k in (slice(None), kept)
+@pytest.mark.parametrize("lost", [0.03, 0.15, 0.4])
+def test_dropped_rows_hide_no_slow_noise(lost: float) -> None:
+    """What rows lost at random leave is told as well as by all, or less so as there are fewer of them."""
+    ratios = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        y = COLUMNS @ TRUE[1:] + 0.05 * np.cumsum(rng.normal(size=N)) + rng.normal(size=N)
+        model = LinearRegressor().fit(COLUMNS, y)
+        kept = rng.random(N) > lost
+        whole, dropped = (
+            np.sqrt(
+                np.diag(noise_covariance([RunRows(COLUMNS[k], y[k], TIME[k])], lambda atoms: atoms, model))
+            )
+            for k in (slice(None), kept)
+        )
+        ratios.append(dropped / whole)
+    assert np.all(np.abs(np.log(np.median(ratios, axis=0) * (1.0 - lost) ** 0.25)) < 0.2)
+
+
+def test_a_run_with_fewer_rows_has_lost_none() -> None:
+    """Rows every 5 s and every 20 s: the latter have gaps, as nothing is known of what lies between."""
+    slow = slice(None, None, 4)
+    times = (TIME, TIME[slow])
+    run = np.repeat([0, 1], [N, N // 4])
+    table = TrainingTable(
+        np.vstack((COLUMNS, COLUMNS[slow])), np.zeros(len(run)), run, np.concatenate(times), run
     )
-    np.testing.assert_allclose(dropped, whole, rtol=0.2)
+    parts, step_s = stretches_of(table)
+    assert step_s == STEP_S and parts[0] == slice(0, N) and len(parts) == 1 + N // 4
 
 
 def turning_run(seed: int) -> tuple[Run, np.ndarray]:

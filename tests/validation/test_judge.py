@@ -171,7 +171,7 @@ def test_the_floor_is_the_noise_and_not_the_drift():
 
 
 def test_the_floor_counts_the_samples_that_averages_hold():
-    """Four in ten samples lost at random: 2 / sqrt(60) is left in averages over 100 s, and they scatter so."""
+    """Four in ten samples lost at random: averages over 100 s scatter by 2 / sqrt(60)."""
     train = ramp_run("a.csv", 0.0, n=40_000)
     rng = np.random.default_rng(6)
     noise = rng.normal(scale=2.0, size=len(train))
