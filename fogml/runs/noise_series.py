@@ -187,7 +187,7 @@ def rows_at_rest(run: Run) -> BoolArray:
     return large.each(lambda rate: np.abs(rate) < AT_REST_DEG_S, run.rate, kind=bool)
 
 
-def sample_interval(run: Run, segments: list[slice]) -> float:
+def sample_interval(run: Run, segments: Sequence[slice]) -> float:
     """Median sample interval [s], or the mean within stretches where lost samples make that longer."""
     steps = sum(part.stop - 1 - part.start for part in segments)
     spent = sum(float(run.time[part.stop - 1] - run.time[part.start]) for part in segments)
