@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.gap.card_form import Form, Root, optimum
+from fogml.gap.card_form import Form, Optimum, Root, optimum
 from fogml.gap.cards import Card, beside_others, card_of, in_form, told_by_family
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
@@ -64,8 +64,21 @@ def fitted_model(
     best = optimum(forms, Root(base))
     for form, fitted in zip(forms, best.effects):
         values[form.declared.id] = EffectValue(form.declared.id, fitted.amplitude, fitted.shape)
+    posterior = _together(found, values, design, base.data, forms, best)
+    return _fit(found, whole, values, posterior, forms, best.unknowns)
+
+
+def _together(
+    found: Inference,
+    values: Mapping[str, EffectValue],
+    design: FloatArray,
+    data: FloatArray,
+    forms: Sequence[Form],
+    best: Optimum,
+) -> Posterior:
+    """Coefficients of a design beside forms that fit best; covariance of both, theirs first."""
     parts = list(zip(forms, best.unknowns))
-    alone = Posterior.of(design, base.data - np.sum([form.made(own) for form, own in parts], axis=0))
+    alone = Posterior.of(design, data - np.sum([form.made(own) for form, own in parts], axis=0))
     slopes = np.concatenate([form.slopes(own) for form, own in parts], axis=1)
     moved = -alone.covariance @ (design.T @ slopes)
     at = np.cumsum([0, *(len(own) for own in best.unknowns[:-1])])
@@ -77,7 +90,7 @@ def fitted_model(
         for k, (form, step) in enumerate(zip(forms, steps)):
             value = values[form.declared.id]
             larger = replace(value, amplitude=value.amplitude + form.usual * float(step))
-            beside = _beside(found, design, values | {value.id: larger}, alone.mean)
+            beside = _beside(found, design, {**values, value.id: larger}, alone.mean)
             loss[:, k] = (beside - mean) / step - moved[:, at[k]]
         moved[:, at] += loss
     # Constants move with the unknowns; with an error of the form by what is not in proportion to it alone.
@@ -85,7 +98,7 @@ def fitted_model(
     with_all, with_form = np.concatenate([moved, unknowns]), known * np.concatenate([loss, unknowns[:, at]])
     covariance = with_all @ best.covariance @ with_all.T + with_form @ with_form.T
     covariance[: len(mean), : len(mean)] += alone.covariance
-    return _fit(found, whole, values, Posterior(mean, covariance), forms, best.unknowns)
+    return Posterior(mean, covariance)
 
 
 def _of_all(
