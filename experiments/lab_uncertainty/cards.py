@@ -97,12 +97,13 @@ def _told(declared: Effect, field: Field, repeats: int, seed: int) -> Iterator[t
             for q in declared.shape
         }
         shape |= {q.name: float(round(shape[q.name])) for q in declared.shape if is_whole(q, scene.grids)}
-        made = field.response(declared, shape)
-        size = D_PRIME / max(field.base.length(made), 1e-300)
         _, usual = declared.amplitude.range(scene.grade)
-        if not field.base.length(made) * usual > 1.0 or size > declared.amplitude.limits[1]:
+        length = field.base.length(field.made(declared, usual, shape))
+        size = usual * D_PRIME / max(length, 1e-300)
+        if not length > 1.0 or size > declared.amplitude.limits[1]:
             continue  # no run of these shows it, or only beyond what is possible
         sign = float(rng.choice((-1.0, 1.0))) if declared.amplitude.signed else 1.0
+        made = field.made(declared, sign * size, shape)
         noise: FloatArray = rng.standard_normal(len(made))
         # A family tells the line that stands out.
         lines = {
@@ -110,7 +111,7 @@ def _told(declared: Effect, field: Field, repeats: int, seed: int) -> Iterator[t
             for q in declared.shape
             if is_line(q)
         }
-        card = card_of(declared.id, field, replace(field.base, data=sign * size * made + noise), lines)
+        card = card_of(declared.id, field, replace(field.base, data=made + noise), lines)
         # (A, phi) and (-A, phi + 180 deg) are one where all turns.
         turned = any(is_angle(q) for q in declared.shape) and sign * card.value.amplitude < 0.0
         errors = []

@@ -79,11 +79,11 @@ def _courses(
             size = cards[id].value.amplitude
             course = course + np.sum([after.of_member(run, m) for m in by_id[id].members], axis=0)
         if id in on:
-            course = course + on[id].amplitude * rows.response(declared, on[id].shape, None, values)
+            course = course + rows.made(declared, on[id].amplitude, on[id].shape, values)
             size += on[id].amplitude
         if not acts:
             size = declared.amplitude.typical(scene.grade)
-            course = size * rows.response(declared, declared.default_shape(scene.grade), None, values)
+            course = rows.made(declared, size, declared.default_shape(scene.grade), values)
         courses.append(Course(id, size, declared.amplitude.unit, acts, declared.amplitude.signed, course))
     return courses
 

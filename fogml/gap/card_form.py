@@ -12,7 +12,7 @@ from fogml.arrays import FloatArray
 from fogml.gap.catalogue import driving_of
 from fogml.gap.field import Field
 from fogml.gap.linear_gaussian import LinearGaussian
-from fogml.gap.shapes import is_angle, is_whole
+from fogml.gap.shapes import AT_AMPLITUDE, at_its_amplitude, is_angle, is_whole
 from fogml.intervals import Z90
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Grade, Quantity
@@ -111,7 +111,8 @@ class Form:
         place: str | None = None,
     ) -> None:
         scene = field.setting.scene
-        self.declared, self.field, self.shape = declared, field, shape
+        self.declared, self.field = declared, field
+        self.shape = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
         self.driving = [
             None if place is None else driving_of(declared, rows, scene, place) for rows in scene.fit
         ]
@@ -131,11 +132,10 @@ class Form:
 
     def slopes(self, unknowns: FloatArray) -> FloatArray:
         """Of what is made, shape (n, unknowns), by central differences where it is not in proportion."""
-        columns = [self._usual(unknowns)]
-        for move in _MOVE * np.eye(len(unknowns))[1:]:
-            both = self._usual(unknowns + move) - self._usual(unknowns - move)
-            columns.append(unknowns[0] * both / (2.0 * _MOVE))
-        return np.column_stack(columns)
+        moves = _MOVE * np.eye(len(unknowns))
+        own = [self._usual(unknowns)] if self.declared.in_proportion else []
+        differences = [self.made(unknowns + move) - self.made(unknowns - move) for move in moves[len(own) :]]
+        return np.column_stack([*own, *(difference / (2.0 * _MOVE) for difference in differences)])
 
     def told(self, unknowns: FloatArray, errors: FloatArray) -> Fitted:
         """What unknowns stand for."""
@@ -161,8 +161,9 @@ class Form:
         return {**self.shape, **own}
 
     def _usual(self, unknowns: FloatArray) -> FloatArray:
-        """At the usual most."""
-        runs, values, shape = self.field.setting.scene.fit, self.field.setting.values, self._shape(unknowns)
+        """Over the amplitude, times its usual most."""
+        runs, values = self.field.setting.scene.fit, self.field.setting.values
+        shape = at_its_amplitude(self.declared, self.usual * float(unknowns[0]), self._shape(unknowns))
         by_run = [r.response(self.declared, shape, t, values) for r, t in zip(runs, self.driving)]
         return self.usual * self.field.whitening.stacked(by_run)
 

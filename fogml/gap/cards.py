@@ -112,7 +112,8 @@ def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, An
         shape_se[name] = math.hypot(best.shape_se[name], math.sqrt(float(weights @ off**2)))
     unknown = [name for name in angles if best.shape_se[name] >= 180.0]
     across = dict(best.shape) | {name: best.shape[name] + 90.0 for name in unknown}
-    if unknown and np.any(field.response(declared, across) != field.response(declared, best.shape)):
+    ways = [field.made(declared, amplitude, shape) for shape in (best.shape, across) if unknown]
+    if ways and np.any(ways[0] != ways[1]):
         # What shows is the part along one direction; of two in three the whole is up to twice as large.
         se = math.hypot(se, amplitude)
     if declared.digitises:

@@ -169,9 +169,10 @@ def sensor_steps(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Blo
 
 def clock_skew(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """The output late or early, by a skew that may grow."""
+    declared = effect("logger_skew")
     hours = (rows.time_s - rows.time_s[0]) / 3600.0
-    for skew in scene.grids.skews_s:
-        change = rows.delayed(skew, constants) / skew
+    for skew in declared.amplitudes:
+        change = rows.response(declared, {"growth": 0.0, AT_AMPLITUDE: skew}, None, constants)
         yield Block(change[:, None], {AT_AMPLITUDE: skew})
         yield Block(np.column_stack([change, 0.3 * hours * change]), {AT_AMPLITUDE: skew, "growth": 0.3})
 

@@ -157,10 +157,10 @@ class Field:
         most, nodes = self.usual_most(family), self.columns.nodes
         return any(s * length <= most for i, s in self.scale.items() if nodes[i].family == family)
 
-    def response(self, declared: Effect, shape: Mapping[str, float], amplitude: float = 1.0) -> FloatArray:
-        """Whitened response of the fit runs to an effect of an amplitude, shape (n,)."""
+    def made(self, declared: Effect, amplitude: float, shape: Mapping[str, float]) -> FloatArray:
+        """What an effect at its amplitude makes of the fit runs, whitened, shape (n,)."""
         values, runs = self.setting.values, self.setting.scene.fit
-        return self.whitening.stacked([amplitude * r.response(declared, shape, None, values) for r in runs])
+        return self.whitening.stacked([r.made(declared, amplitude, shape, values) for r in runs])
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,6 @@ from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.model import EffectValue, TwinModel, with_effects
 from fogml.gap.posterior import Cause, Judgement
 from fogml.gap.result import ConstantFit
-from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.twin.nominal import NAMES
 from fogml.twin.twin import Uncertainty
 
@@ -55,9 +54,7 @@ def fitted_model(
     forms = []
     for id, value in values.items():
         if in_form(declared := candidates[id]):
-            # What is not in proportion to its amplitude is taken about it.
-            about = {AT_AMPLITUDE: value.amplitude} if declared.amplitudes and value.amplitude else {}
-            forms.append(Form(declared, held, value.amplitude, {**value.shape, **about}))
+            forms.append(Form(declared, held, value.amplitude, value.shape))
     if not forms:
         alone = Posterior.of(design, base.data)
         return _fit(found, whole, values, alone, [], [])
@@ -78,25 +75,23 @@ def _together(
 ) -> Posterior:
     """Coefficients of a design beside forms that fit best; covariance of both, theirs first."""
     parts = list(zip(forms, best.unknowns))
-    alone = Posterior.of(design, data - np.sum([form.made(own) for form, own in parts], axis=0))
+    made = np.column_stack([form.made(own) for form, own in parts])
+    alone = Posterior.of(design, data - made.sum(axis=1))
     slopes = np.concatenate([form.slopes(own) for form, own in parts], axis=1)
     moved = -alone.covariance @ (design.T @ slopes)
     at = np.cumsum([0, *(len(own) for own in best.unknowns[:-1])])
-    known = found.setting.priors.form_error * np.abs([own[0] for own in best.unknowns])
-    mean, loss = alone.mean, np.zeros((len(design.T), len(forms)))
+    sizes = np.array([own[0] for own in best.unknowns])
+    known = found.setting.priors.form_error * np.abs(sizes)
+    in_proportion = made / np.where(sizes != 0.0, sizes, 1.0)
+    mean = alone.mean
     if isinstance(found.model, TwinModel):
         mean = _beside(found, design, values, alone.mean)
-        steps = np.hypot(np.sqrt(np.diagonal(best.covariance)[at]), known)
-        for k, (form, step) in enumerate(zip(forms, steps)):
-            value = values[form.declared.id]
-            larger = replace(value, amplitude=value.amplitude + form.usual * float(step))
-            beside = _beside(found, design, {**values, value.id: larger}, alone.mean)
-            loss[:, k] = (beside - mean) / step - moved[:, at[k]]
-        moved[:, at] += loss
     # Constants move with the unknowns; with an error of the form by what is not in proportion to it alone.
     unknowns = np.eye(slopes.shape[1])
-    with_all, with_form = np.concatenate([moved, unknowns]), known * np.concatenate([loss, unknowns[:, at]])
-    covariance = with_all @ best.covariance @ with_all.T + with_form @ with_form.T
+    with_all = np.concatenate([moved, unknowns])
+    with_form = with_all[:, at].copy()
+    with_form[: len(mean)] += alone.covariance @ (design.T @ in_proportion)
+    covariance = with_all @ best.covariance @ with_all.T + (known * with_form) @ (known * with_form).T
     covariance[: len(mean), : len(mean)] += alone.covariance
     return Posterior(mean, covariance)
 
@@ -112,7 +107,7 @@ def _of_all(
         id = cause.ids[0]
         if id in had:
             declared, setting = had[id]
-            own = setting.amplitude * held.response(declared, setting.shape)
+            own = held.made(declared, setting.amplitude, setting.shape)
             more += own
             beside = beside_others(found, judged.best.members, cause)
             data = replace(beside, data=beside.data + own)

@@ -159,7 +159,7 @@ def fixed_columns(setting: Setting, run: int, plant: Twin) -> FloatArray:
         if declared.drawn_per_run:
             own_column = np.zeros((len(rows), scene.fitted))
             if run < scene.fitted:
-                own_column[:, run] = held.amplitude * rows.response(declared, held.shape, None, values)
+                own_column[:, run] = rows.made(declared, held.amplitude, held.shape, values)
             columns.append(own_column)
     off = {i: r.own.nuisances(values) for i, r in enumerate(scene.runs) if r.own is not None}
     for name in sorted({name for named in off.values() for name in named}):

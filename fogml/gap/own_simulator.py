@@ -42,6 +42,10 @@ class OwnEffect(Effect):
         """Not known apart from a run: see `OwnOnRun.response`."""
         raise TypeError(f"{self.id}: the model itself responds, on its runs")
 
+    @property
+    def in_proportion(self) -> bool:
+        return not self.amplitudes
+
 
 @dataclass(frozen=True, eq=False)
 class OwnOnRun:

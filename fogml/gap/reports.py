@@ -58,7 +58,7 @@ def usual_length(found: Inference, declared: Effect) -> float:
         return float(found.setting.priors.least_detectable)
     grade = found.scene.grade
     usual = declared.amplitude.typical(grade)
-    return found.field.base.length(found.field.response(declared, declared.default_shape(grade), usual))
+    return found.field.base.length(found.field.made(declared, usual, declared.default_shape(grade)))
 
 
 def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[str, float]:

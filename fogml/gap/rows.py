@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.gap.own_simulator import OwnEffect, OwnOnRun
-from fogml.gap.shapes import AT_AMPLITUDE
+from fogml.gap.shapes import AT_AMPLITUDE, at_its_amplitude
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals.smoothing import Smoothness, at_points, window_difference
-from fogml.twin.effect import Effect, LoopEffect
+from fogml.twin.effect import Effect
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import (
     DELTA,
@@ -140,20 +140,38 @@ class Rows:
         meets output and slopes. A shape that says `AT_AMPLITUDE` asks for what that amplitude makes of the
         output, over it.
         """
-        if AT_AMPLITUDE in shape:
-            about = shape[AT_AMPLITUDE]
-            bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
-            return self._changed_output(declared, bare, about, constants or {}) / about
+        about = shape.get(AT_AMPLITUDE)
+        bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
         if isinstance(declared, OwnEffect):
             assert self.own is not None
-            return self.samples(self.own.response(declared.id, shape, constants or {}))
+            if about is None:
+                return self.samples(self.own.response(declared.id, bare, constants or {}))
+            return self.samples(self.own.changed(declared.id, bare, about, constants or {})) / about
         fast = {"rate", "angle", "output", "slopes", "earth"} & set(declared.needs)
         met = constants if {"output", "slopes"} & set(declared.needs) else None
-        if self.turns and (fast or declared.stage in ("scale_factor", "rig", "loop")):
-            inputs = self._inputs(True, temperatures, met)
-            return self.of(self.by_sample.means(np.asarray(declared.response(inputs, **shape), np.float64)))
-        values = declared.response(self._inputs(False, temperatures, met), **shape)
-        return self.of(np.broadcast_to(np.asarray(values, dtype=np.float64), self.kept.shape))
+        by_sample = self.turns and bool(fast or declared.stage in ("scale_factor", "rig", "loop"))
+        inputs = self._inputs(by_sample, temperatures, met)
+        values = np.asarray(
+            declared.response(inputs, **bare)
+            if about is None
+            else declared.change(inputs, about, **bare) / about,
+            dtype=np.float64,
+        )
+        if by_sample:
+            return self.samples(values)
+        return self.of(np.broadcast_to(values, self.kept.shape))
+
+    def made(
+        self,
+        declared: Effect,
+        amplitude: float,
+        shape: Mapping[str, float],
+        constants: Mapping[str, float] | None = None,
+    ) -> FloatArray:
+        """Of an effect at its amplitude [deg/h], shape (m,)."""
+        return amplitude * self.response(
+            declared, at_its_amplitude(declared, amplitude, shape), None, constants
+        )
 
     def _inputs(
         self,
@@ -194,25 +212,6 @@ class Rows:
         output = (1.0 + 1e-6 * scale_factor_ppm(inputs, nominal)) * inputs.input_rate_deg_h
         output = output + bias_deg_h(inputs, nominal)
         return replace(inputs, output=np.asarray(output), slopes=temperature_slopes(inputs, nominal))
-
-    def _changed_output(
-        self, declared: Effect, shape: Mapping[str, float], amplitude: float, constants: Mapping[str, float]
-    ) -> FloatArray:
-        """What an effect that meets the output makes of it at an amplitude [deg/h], shape (m,)."""
-        if isinstance(declared, OwnEffect):
-            assert self.own is not None
-            return self.samples(self.own.changed(declared.id, shape, amplitude, constants))
-        assert isinstance(declared, LoopEffect)
-        inputs = self._inputs(True, None, constants)
-        output = np.asarray(inputs.output)
-        return self.of(self.by_sample.means(declared.apply(output, inputs, amplitude) - output))
-
-    def delayed(self, delay_s: float, constants: Mapping[str, float]) -> FloatArray:
-        """What a delay of the output [s] makes of it [deg/h], shape (m,)."""
-        inputs = self._inputs(True, None, constants)
-        output = np.asarray(inputs.output)
-        late = np.interp(inputs.time - delay_s, inputs.time, output)
-        return self.of(self.by_sample.means(late - output))
 
 
 @dataclass(frozen=True, eq=False)

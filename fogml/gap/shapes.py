@@ -59,7 +59,7 @@ class Grids:
     machine_lags_s, plant_lags_s, lead_lags_s, moisture_s
         Lags of a chamber's machines, of another plant's nodes, of the coil and the can as leads pass them,
         and of a coil that takes up the air's moisture.
-    sensor_lag_s, placement_lag_s, skews_s
+    sensor_lag_s, placement_lag_s
         Scale of a sensor's second lag; lag of a place behind a sensor; skews of the clock.
     cycle_s
         Shortest and longest period of a chamber's own cycle.
@@ -114,7 +114,6 @@ class Grids:
     moisture_s: tuple[float, ...] = (1800.0, 7200.0, 36000.0, 144000.0, 600000.0)
     sensor_lag_s: float = 60.0
     placement_lag_s: float = 600.0
-    skews_s: tuple[float, ...] = (-200.0, -60.0, -10.0, 0.1, 10.0, 60.0, 200.0)
     cycle_s: tuple[float, float] = (60.0, 1500.0)
     grid_nodes: tuple[int, int, int] = (9, 5, 4)
     line_cycles: float = 0.3
@@ -148,6 +147,11 @@ STANDARD = Grids()
 Response = Callable[[Mapping[str, float]], FloatArray]
 AT_AMPLITUDE = "at_amplitude"
 """Key of a node's shape: the amplitude about which a response that is not in proportion to it is taken."""
+
+
+def at_its_amplitude(declared: Effect, amplitude: float, shape: Mapping[str, float]) -> Mapping[str, float]:
+    """A shape that asks for the response at an amplitude, where that is not in proportion to it."""
+    return shape if declared.in_proportion or amplitude == 0.0 else {**shape, AT_AMPLITUDE: amplitude}
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError, known_are
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Grade, Quantity
+from fogml.twin.responses import met_output
 
 if TYPE_CHECKING:
     from fogml.twin.plant.network import ThermalNetwork
@@ -114,6 +115,15 @@ class Effect(ABC):
         """Change of the gyro's output [deg/h] on a whole run per unit of amplitude, shape (n,)."""
         return self.in_hindsight(inputs, **shape)
 
+    @property
+    def in_proportion(self) -> bool:
+        """Whether the output changes in proportion to the amplitude."""
+        return True
+
+    def change(self, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
+        """Change of the gyro's output [deg/h] on a whole run at an amplitude, shape (n,)."""
+        return amplitude * self.response(inputs, **shape)
+
     def default_shape(self, grade: Grade = "tactical") -> dict[str, float]:
         """Shape parameters in the middle of a grade's range."""
         return {parameter.name: parameter.typical(grade) for parameter in self.shape}
@@ -157,6 +167,13 @@ class RigEffect(Effect):
         """What it adds to the rate about the input axis [deg/h], shape (n,), given its signature there."""
         return amplitude * signature
 
+    @property
+    def in_proportion(self) -> bool:
+        return type(self).added_rate is RigEffect.added_rate
+
+    def change(self, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
+        return self.added_rate(self.response(inputs, **shape), inputs, amplitude, **shape)
+
 
 class ScaleFactorEffect(Effect):
     """Adds to the scale factor error [ppm]."""
@@ -176,6 +193,14 @@ class LoopEffect(Effect):
     def apply(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
         """The loop's output [deg/h] for an undistorted `output` [deg/h], both of shape (n,)."""
         return output + amplitude * self.signature(inputs.with_output(output), **shape)
+
+    @property
+    def in_proportion(self) -> bool:
+        return type(self).apply is LoopEffect.apply
+
+    def change(self, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
+        output = met_output(inputs)
+        return self.apply(output, inputs, amplitude, **shape) - output
 
 
 class ReadoutEffect(LoopEffect):
@@ -212,6 +237,14 @@ class LoggerEffect(Effect):
     @abstractmethod
     def record(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
         """The output as logged [deg/h], shape (n,)."""
+
+    @property
+    def in_proportion(self) -> bool:
+        return False
+
+    def change(self, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
+        output = met_output(inputs)
+        return self.record(output, inputs, amplitude, **shape) - output
 
 
 class ThermalEffect(Effect):

@@ -55,7 +55,7 @@ def test_sizes_directions_and_shapes_are_those_that_made_the_data(field, id, amp
     """Between the nodes of a grid, too; (A, phi) and (-A, phi + 180 deg) are one."""
     declared = field.setting.scene.candidates[id]
     shape = declared.default_shape("tactical") | stated
-    made = field.response(declared, shape, amplitude)
+    made = field.made(declared, amplitude, shape)
     inside = dict.fromkeys(stated, 0)
     for seed in range(4):
         noise = np.random.default_rng(seed).standard_normal(len(made))
@@ -89,7 +89,7 @@ def test_a_direction_that_does_not_matter_leaves_a_size_alone():
     run = Run.from_columns("a", time=time, gyro=np.zeros(len(time)), **columns)
     field = foreseen(TwinModel(load_twin("nominal")), [run], NoiseModel(0.005, 0.0, 0.0), STANDARD).field
     declared = field.setting.scene.candidates["chamber_pickup"]
-    made = field.response(declared, declared.default_shape("tactical"), 0.3)
+    made = field.made(declared, 0.3, declared.default_shape("tactical"))
     card = card_of("chamber_pickup", field, replace(field.base, data=made), {})
     assert card.value.amplitude == pytest.approx(0.3, rel=1e-3)
     alone = field.base.length(made) ** -1.0

@@ -68,7 +68,7 @@ def test_a_form_that_the_runs_cannot_show_has_no_share_in_a_size():
     )
     field = foreseen(TwinModel(load_twin("nominal")), [run], NoiseModel(0.005, 0.0, 0.0), STANDARD).field
     card = card_of("azimuthal_gradient", field, field.base, {})
-    column = field.response(field.setting.scene.candidates["azimuthal_gradient"], {"phase": 0.0})
+    column = field.made(field.setting.scene.candidates["azimuthal_gradient"], 1.0, {"phase": 0.0})
     size = float(field.base.fits(column[:, None])[0] / field.base.gram(column[:, None])[0, 0])
     assert card.value.amplitude == pytest.approx(abs(size), rel=1e-3)
     # How much more is across is not known: half of all directions are within 41 % more, two in three twice.

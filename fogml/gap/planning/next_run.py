@@ -215,9 +215,9 @@ def rehearse(
         usual = declared.amplitude.typical(grade)
         asked = [("usual", usual)] + ([("found", sizes[declared.id])] if declared.id in sizes else [])
         for form, shape in zip(FORMS, usual_shapes(declared, grade)):
-            response = search.field.response(declared, shape)
             for size, amplitude in asked:
-                rows.append(_judged(search, f, form, size, amplitude * response, cost_of_false_name))
+                made = search.field.made(declared, amplitude, shape)
+                rows.append(_judged(search, f, form, size, made, cost_of_false_name))
             if not declared.shape:
                 break
     return tuple(rows)
