@@ -100,8 +100,9 @@ def _told(declared: Effect, field: Field, repeats: int, seed: int) -> Iterator[t
         _, usual = declared.amplitude.range(scene.grade)
         length = field.base.length(field.made(declared, usual, shape))
         size = usual * D_PRIME / max(length, 1e-300)
-        if not length > 1.0 or size > declared.amplitude.limits[1]:
-            continue  # no run of these shows it, or only beyond what is possible
+        greatest = declared.amplitude.limits[1] if declared.in_proportion else usual
+        if not length > 1.0 or size > greatest:
+            continue  # no run of these shows it at a size of its card, or a possible one
         sign = float(rng.choice((-1.0, 1.0))) if declared.amplitude.signed else 1.0
         made = field.made(declared, sign * size, shape)
         noise: FloatArray = rng.standard_normal(len(made))
