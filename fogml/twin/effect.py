@@ -13,7 +13,6 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError, known_are
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Grade, Quantity
-from fogml.twin.responses import met_output
 
 if TYPE_CHECKING:
     from fogml.twin.plant.network import ThermalNetwork
@@ -199,7 +198,7 @@ class LoopEffect(Effect):
         return type(self).apply is LoopEffect.apply
 
     def change(self, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
-        output = met_output(inputs)
+        output = inputs.met_output
         return self.apply(output, inputs, amplitude, **shape) - output
 
 
@@ -243,7 +242,7 @@ class LoggerEffect(Effect):
         return False
 
     def change(self, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
-        output = met_output(inputs)
+        output = inputs.met_output
         return self.record(output, inputs, amplitude, **shape) - output
 
 

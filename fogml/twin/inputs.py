@@ -313,6 +313,11 @@ class Inputs:
         """
         return replace(self, memory=Memory())
 
+    @property
+    def met_output(self) -> FloatArray:
+        """The output that an effect meets [deg/h], shape (n,); the input rate where none is given."""
+        return self.input_rate_deg_h if self.output is None else self.output
+
     def with_output(self, output: FloatArray) -> Inputs:
         """The same inputs with the output that an effect meets [deg/h], shape (n,)."""
         return replace(self, output=output)

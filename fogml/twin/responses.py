@@ -16,11 +16,6 @@ from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA, DELTA_WINDOW_S
 
 
-def met_output(inputs: Inputs) -> FloatArray:
-    """The output that the effect meets [deg/h], shape (n,); the input rate where none is given."""
-    return inputs.input_rate_deg_h if inputs.output is None else inputs.output
-
-
 def slope_per_s(inputs: Inputs, key: str, x: FloatArray) -> FloatArray:
     """Slope of x from the sample before to each sample [1/s], shape (n,); 0 at the first one."""
     step_x = x - inputs.memory.previous(f"{key} value", x)

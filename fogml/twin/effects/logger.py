@@ -8,7 +8,7 @@ from fogml.arrays import FloatArray
 from fogml.twin.effect import LoggerEffect, NoiseEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import shared, signed, unsigned
-from fogml.twin.responses import met_output, slope_per_s
+from fogml.twin.responses import slope_per_s
 
 
 class LoggerSkew(LoggerEffect):
@@ -44,7 +44,7 @@ class LoggerSkew(LoggerEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         growing = self._growing(inputs, shape["growth"])
-        return -growing * slope_per_s(inputs, self.id, met_output(inputs))
+        return -growing * slope_per_s(inputs, self.id, inputs.met_output)
 
     def record(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
         """The output as logged [deg/h], linear between samples, shape (n,).
@@ -94,7 +94,7 @@ class Averaging(LoggerEffect):
     candidate = False
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
-        return -0.5 * slope_per_s(inputs, self.id, met_output(inputs))
+        return -0.5 * slope_per_s(inputs, self.id, inputs.met_output)
 
     def record(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
         """The output as logged [deg/h], shape (n,); windows cut by the start take what there is."""
@@ -138,7 +138,7 @@ class UnitsAndGaps(LoggerEffect):
     candidate = False
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
-        return 1.0 * met_output(inputs)
+        return 1.0 * inputs.met_output
 
     def record(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
         return (1.0 + amplitude) * output

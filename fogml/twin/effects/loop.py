@@ -8,7 +8,7 @@ from fogml.arrays import FloatArray
 from fogml.twin.effect import LoopEffect, ReadoutEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import shared, signed, unsigned
-from fogml.twin.responses import met_output, slope_per_s
+from fogml.twin.responses import slope_per_s
 
 
 class LoopGain(LoopEffect):
@@ -47,7 +47,7 @@ class LoopGain(LoopEffect):
     candidate = False
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
-        output = met_output(inputs)
+        output = inputs.met_output
         return -self._dimming(inputs, shape["power_slope"]) * (
             slope_per_s(inputs, self.id, output) + output / shape["leak_time"]
         )
@@ -104,7 +104,7 @@ class Deadband(LoopEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h of w_d about its usual size [deg/h], shape (n,), between -1 and 1."""
-        usual, met = self.amplitude.typical(), met_output(inputs)
+        usual, met = self.amplitude.typical(), inputs.met_output
         return (self.apply(met, inputs, usual) - met) / usual
 
     def apply(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
@@ -184,7 +184,7 @@ class RateRange(ReadoutEffect):
     candidate = False
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
-        output = met_output(inputs)
+        output = inputs.met_output
         beyond = np.maximum(np.abs(output) - 3600.0 * shape["range"], 0.0)
         return -np.copysign(beyond, output)
 
@@ -220,5 +220,5 @@ class SlewLimit(LoopEffect):
     candidate = False
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
-        output = met_output(inputs)
+        output = inputs.met_output
         return inputs.memory.slew(self.id, inputs.time, output, 3600.0 * shape["slew"]) - output
