@@ -12,7 +12,7 @@ from fogml.arrays import FloatArray
 from fogml.gap.catalogue import driving_of
 from fogml.gap.field import Field
 from fogml.gap.linear_gaussian import LinearGaussian
-from fogml.gap.shapes import AT_AMPLITUDE, at_its_amplitude, is_angle, is_whole
+from fogml.gap.shapes import AT_AMPLITUDE, at_amplitude, is_angle, is_whole
 from fogml.intervals import Z90
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Grade, Quantity
@@ -163,7 +163,7 @@ class Form:
     def _usual(self, unknowns: FloatArray) -> FloatArray:
         """Over the amplitude, times its usual most."""
         runs, values = self.field.setting.scene.fit, self.field.setting.values
-        shape = at_its_amplitude(self.declared, self.usual * float(unknowns[0]), self._shape(unknowns))
+        shape = at_amplitude(self.declared, self.usual * float(unknowns[0]), self._shape(unknowns))
         by_run = [r.response(self.declared, shape, t, values) for r, t in zip(runs, self.driving)]
         return self.usual * self.field.whitening.stacked(by_run)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.gap.own_simulator import OwnEffect, OwnOnRun
-from fogml.gap.shapes import AT_AMPLITUDE, at_its_amplitude
+from fogml.gap.shapes import AT_AMPLITUDE, at_amplitude
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals.smoothing import Smoothness, at_points, window_difference
@@ -169,9 +169,7 @@ class Rows:
         constants: Mapping[str, float] | None = None,
     ) -> FloatArray:
         """Of an effect at its amplitude [deg/h], shape (m,)."""
-        return amplitude * self.response(
-            declared, at_its_amplitude(declared, amplitude, shape), None, constants
-        )
+        return amplitude * self.response(declared, at_amplitude(declared, amplitude, shape), None, constants)
 
     def _inputs(
         self,

@@ -149,7 +149,7 @@ AT_AMPLITUDE = "at_amplitude"
 """Key of a node's shape: the amplitude about which a response that is not in proportion to it is taken."""
 
 
-def at_its_amplitude(declared: Effect, amplitude: float, shape: Mapping[str, float]) -> Mapping[str, float]:
+def at_amplitude(declared: Effect, amplitude: float, shape: Mapping[str, float]) -> Mapping[str, float]:
     """A shape that asks for the response at an amplitude, where that is not in proportion to it."""
     return shape if declared.in_proportion or amplitude == 0.0 else {**shape, AT_AMPLITUDE: amplitude}
 
