@@ -12,7 +12,8 @@ from fogml.arrays import FloatArray
 from fogml.gap.catalogue import driving_of
 from fogml.gap.field import Field
 from fogml.gap.linear_gaussian import LinearGaussian
-from fogml.gap.shapes import AT_AMPLITUDE, at_amplitude, is_angle, is_whole
+from fogml.gap.rows import at_amplitude
+from fogml.gap.shapes import AT_AMPLITUDE, is_angle, is_whole
 from fogml.intervals import Z90
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Grade, Quantity

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.gap.own_simulator import OwnEffect, OwnOnRun
-from fogml.gap.shapes import AT_AMPLITUDE, at_amplitude
+from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals.smoothing import Smoothness, at_points, window_difference
@@ -32,6 +32,11 @@ from fogml.twin.twin import Twin
 READ_GROUPS = (("T", "T_in"), ("T_out",))
 """Temperatures that drive the model, by the sensors that err together."""
 READ = tuple(name for group in READ_GROUPS for name in group)
+
+
+def at_amplitude(declared: Effect, amplitude: float, shape: Mapping[str, float]) -> Mapping[str, float]:
+    """A shape that asks for the response at an amplitude, where that is not in proportion to it."""
+    return shape if declared.in_proportion or amplitude == 0.0 else {**shape, AT_AMPLITUDE: amplitude}
 
 
 @dataclass(frozen=True, eq=False)

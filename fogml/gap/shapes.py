@@ -149,11 +149,6 @@ AT_AMPLITUDE = "at_amplitude"
 """Key of a node's shape: the amplitude about which a response that is not in proportion to it is taken."""
 
 
-def at_amplitude(declared: Effect, amplitude: float, shape: Mapping[str, float]) -> Mapping[str, float]:
-    """A shape that asks for the response at an amplitude, where that is not in proportion to it."""
-    return shape if declared.in_proportion or amplitude == 0.0 else {**shape, AT_AMPLITUDE: amplitude}
-
-
 @dataclass(frozen=True)
 class GridNode:
     """A point of the grid: a stated shape, and the shapes whose responses span what it can do.
