@@ -15,6 +15,7 @@ from fogml.runs.noise_series import rows_at_rest, sample_interval
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import thermal_columns
 from fogml.signals import large
+from fogml.signals.clock import gap_starts, longest_gap_s
 from fogml.signals.distributions import chi2_ppf
 from fogml.signals.floor import Columns, Floor, FloorModel, floor_model
 from fogml.validation.results import RunJudgement
@@ -40,7 +41,7 @@ def floor_of_run(
     noise
         A static run of the unit.
     """
-    windows = max(int(np.count_nonzero(used) * _interval_s(run) / averaging_s), 2)
+    windows = max(int(np.count_nonzero(used) * _interval_s(run, averaging_s) / averaging_s), 2)
     if noise is not None:
         still = rows_at_rest(noise)
         found = _model(noise, still, noise.error_deg_h, averaging_s, static=True)
@@ -58,7 +59,7 @@ def floors_over(run: Run, averaging_s: float, times_s: Sequence[float]) -> list[
     averages, or turns throughout.
     """
     still = rows_at_rest(run)
-    recorded_s = np.count_nonzero(still) * _interval_s(run)
+    recorded_s = np.count_nonzero(still) * _interval_s(run, averaging_s)
     if recorded_s < 2.0 * averaging_s:
         return []
     found = _model(run, still, run.error_deg_h, averaging_s)
@@ -96,7 +97,7 @@ def _model(
         drifts = moves or (not static and not run.temperature_columns)
         kept[key] = floor_model(
             large.chosen(error_deg_h, used),
-            _interval_s(run),
+            _interval_s(run, averaging_s),
             averaging_s,
             starts,
             stops,
@@ -107,9 +108,10 @@ def _model(
     return found
 
 
-def _interval_s(run: Run) -> float:
-    """Time that a sample stands for [s]: averages over a time hold fewer of them where some are lost."""
-    return sample_interval(run, run.stretches)
+def _interval_s(run: Run, averaging_s: float) -> float:
+    """Time that a sample stands for [s] in averages, which hold fewer of them where some are lost."""
+    cuts = gap_starts(run.time, run.sample_s, longest_gap_s(averaging_s, run.sample_s))
+    return sample_interval(run, [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), len(run)])])
 
 
 def _at_rows(run: Run, rows: IntArray) -> Columns:

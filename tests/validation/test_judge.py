@@ -181,4 +181,4 @@ def test_the_floor_counts_the_samples_that_averages_hold():
         judge(KnownDrift(slope_law).fit(train), train, test, noise=test).test[0],
     ):
         assert judged.after.bias_stability == pytest.approx(2.0 / np.sqrt(60.0), rel=0.1)
-        assert judged.floor == pytest.approx(2.0 / np.sqrt(60.0), rel=0.06)
+        assert judged.floor == pytest.approx(2.0 / np.sqrt(60.0), rel=0.04)
