@@ -234,7 +234,7 @@ def _answer(
         counterfactuals=counterfactuals(found, after, named, cards) if courses else (),
         series=series_of(found, recalibrated, after),
         unusable=found.unusable,
-        assumed=assumed(found),
+        assumed=assumed(found, fit.constants),
         model=found.model.name,
         what_if=what_if,
         nearest=nearest,

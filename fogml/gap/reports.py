@@ -13,7 +13,7 @@ from fogml.gap.frame import whitener_of
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.posterior import Judgement
-from fogml.gap.result import CandidateEvidence, Found, NoiseReport, Unknown, Verdict
+from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Unknown, Verdict
 from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries
 from fogml.gap.where import averages
 from fogml.signals.bases import rate
@@ -136,17 +136,16 @@ def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tupl
     return tuple(out)
 
 
-def assumed(found: Inference) -> tuple[str, ...]:
-    """What was taken for granted, in sentences, the priors among them."""
+def assumed(found: Inference, constants: Sequence[ConstantFit]) -> tuple[str, ...]:
+    """What was taken for granted, in sentences, the priors among them; `constants` as they were found."""
     setting, said = found.setting, []
-    for name, factor in setting.widened.items():
-        constant = next(c for c in setting.constants if c.name == name)
-        off = abs(setting.values[name] - constant.mean) / constant.sd
-        if off > setting.priors.noise.far_off:
+    for fit in constants:
+        off = abs(fit.value - fit.prior_mean) / fit.prior_sd
+        if fit.name in setting.widened and off > setting.priors.noise.far_off:
             said.append(
-                f"{name} = {setting.values[name]:.4g} {constant.unit} is {off:.3g} standard deviations off "
-                f"what was expected ({constant.mean:g} ± {constant.sd:g}): a unit, a sign or the twin may be "
-                f"wrong. Its prior was widened {factor:.3g} times for the rest."
+                f"{fit.name} = {fit.value:.4g} {fit.unit} is {off:.3g} standard deviations off what was "
+                f"expected ({fit.prior_mean:g} ± {fit.prior_sd:g}): a unit, a sign or the twin may be wrong. "
+                f"Its prior was widened {setting.widened[fit.name]:.3g} times for the rest."
             )
     for rows in setting.scene.runs:
         if rows.masked:

@@ -1,5 +1,6 @@
 """Runs as rows: what is masked, constants far off, what each run draws anew."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from fogml.gap.frame import setting_of
 from fogml.gap.model import TwinModel
 from fogml.gap.reading import rows_of
 from fogml.gap.reports import assumed
+from fogml.gap.result import ConstantFit
 from fogml.gap.scene import Family, Scene, steps_are_coarse
 from fogml.gap.settings import Priors
 from fogml.gap.thermal_families import hidden_node
@@ -62,8 +64,11 @@ def test_a_constant_far_off_is_said_and_fitted_all_the_same():
     assert setting.values["b0"] == pytest.approx(-40.0, abs=0.1)
     assert setting.widened["b0"] == pytest.approx(2.0 * 40.0 / 5.0, rel=0.05)
     found = SimpleNamespace(setting=setting, points=SimpleNamespace(source="-"))
-    (said,) = [line for line in assumed(found) if "standard deviations off" in line]
+    far = ConstantFit("b0", "deg/h", 0.0, 5.0, -40.0, 0.01)
+    (said,) = [line for line in assumed(found, [far]) if "standard deviations off" in line]
     assert said.startswith("b0 = -40") and "is 8 standard deviations off" in said
+    # What was far off until a cause was found is not.
+    assert "standard deviations off" not in " ".join(assumed(found, [replace(far, value=1.0)]))
 
 
 def test_what_each_run_draws_anew_has_columns_of_its_own():
