@@ -181,7 +181,21 @@ def of_many_features() -> str:
     return certificate(replace(judged, model=model), "2026-03-02")
 
 
-@pytest.mark.parametrize("make", [lambda: pages()["certificate"], of_many_features])
+def of_many_words() -> str:
+    """The certificate of a long unit's name and verdict, an index out of reach, Earth rate not known."""
+    judged = judgement(2)
+    runs = tuple(
+        replace(run, unit="MEMS IMU of a long name/examples", run=f"thermal-cycle-{run.run}")
+        for run in judged.test
+    )
+    notes = (
+        "No model can reach the design index: " + 6 * "so says the noise, ",
+        7 * "Earth rate is not known, ",
+    )
+    return certificate(replace(judged, test=runs, notes=notes))
+
+
+@pytest.mark.parametrize("make", [lambda: pages()["certificate"], of_many_features, of_many_words])
 def test_a_certificate_prints_on_one_a4_sheet(browser, make) -> None:
     opened = browser(make())
     assert "<svg" in opened.tell("document.documentElement.outerHTML")
