@@ -28,7 +28,7 @@ _NOISE = {
     "B": ("flicker", "deg/h"),
     "K": ("rate random walk", "deg/h/√h"),
 }
-_CONSTANTS = {
+CONSTANTS = {
     "e0": "scale factor",
     "k1": "scale factor, by T",
     "k2": "scale factor, by T²",
@@ -38,6 +38,7 @@ _CONSTANTS = {
     "g": "bias, by T_in − T_out",
     "m": "bias, by ΔT",
 }
+"""What the twin's constants are, by their names."""
 
 
 def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
@@ -208,7 +209,7 @@ def constants_table(found: Diagnosis) -> Table:
     """Prior and fitted value of each constant."""
     rows = [
         (
-            f"{c.name}: {_CONSTANTS[c.name]}" if c.name in _CONSTANTS else c.name,
+            f"{c.name}: {CONSTANTS[c.name]}" if c.name in CONSTANTS else c.name,
             f"{number(c.prior_mean)} ± {number(c.prior_sd, 2)}",
             with_error(c.value, c.se),
             unit_words(c.unit),

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 
 from fogml.gap.result_parts import Rehearsed
 from fogml.report import style
+from fogml.report.gap_tables import CONSTANTS
 from fogml.report.gap_tables_ahead import rehearsal_table
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import log_axis, time_unit
@@ -236,7 +237,7 @@ def _wanted(values: Mapping[str, Any]) -> Table | None:
         return None
     rows = [
         (
-            e["name"],
+            f"{e['name']}: {CONSTANTS[e['name']]}" if e["name"] in CONSTANTS else e["name"],
             e["unit"],
             number(e["usual"]),
             number(e["prior_se"]),
@@ -289,7 +290,7 @@ def _separations(values: Mapping[str, Any]) -> Table | None:
 def _alternatives(run: Mapping[str, Any]) -> Table | None:
     if not run["alternatives"]:
         return None
-    wanted = [e["name"] for e in run["wanted"]][:5]
+    wanted = [(e["name"], e["unit"]) for e in run["wanted"]][:5]
     groups = [", ".join(s["separates"]) for s in run["separations"]]
 
     def row(told: Mapping[str, Any], mark: str) -> Row:
@@ -300,8 +301,8 @@ def _alternatives(run: Mapping[str, Any]) -> Table | None:
     return Table(
         columns=(
             *columns_of("Programme | >Hours"),
-            *((f"se of {name}", "", "figure") for name in wanted),
-            *((f"distance of {group}", "", "figure") for group in groups),
+            *((f"Standard error of {name}", unit, "figure") for name, unit in wanted),
+            *((f"Distance of {group}", "", "figure") for group in groups),
         ),
         rows=(row(run, "chosen"), *(row(told, "") for told in run["alternatives"])),
         caption="The chosen programme and runners-up; their steps are in plan.json.",

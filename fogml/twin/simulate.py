@@ -224,7 +224,8 @@ def world_of(
         programme = load_programme(programme)
     unit = twin if isinstance(twin, Twin) else load_twin(twin)
     facts = default_facts(programme) if facts is None else facts
-    notes = f"synthetic: programme {programme.name}, twin {unit.name}, seed {seed}"
+    steps = "steps of its own" if programme.name == "programme" else f"programme {programme.name}"
+    notes = f"synthetic: {steps}, twin {unit.name}, seed {seed}"
     stated = facts.model_copy(update={"unit": facts.unit or unit.name, "notes": facts.notes or notes})
     counts = unit.counts_per_deg_h(sample_s)
     if counts is not None:

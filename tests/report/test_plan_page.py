@@ -17,3 +17,9 @@ def test_runners_up_stand_beside_the_chosen_programme():
     assert OTHER in page and "7.25" in page and "runners-up" in page
     run["alternatives"] = []
     assert "runners-up" not in plan_page(values)
+
+
+def test_a_constant_is_told_in_words():
+    values = deepcopy(written("plan"))
+    values["wanted"][0] |= {"name": "k1", "unit": "ppm/degC"}
+    assert "k1: scale factor, by T" in plan_page(values)

@@ -252,3 +252,8 @@ def test_a_sensor_needs_its_place():
     twin = Twin(sensors=Sensors(single={"T3": SensorErrors(reads={"T_nowhere": 1.0})}))
     with pytest.raises(InputError, match="'T3' reads 'T_nowhere'"):
         simulate(QUICK, twin, sample_s=10.0, columns=("T3",))
+
+
+def test_a_run_of_bare_steps_says_so() -> None:
+    notes = simulate(["soak at 25 degC for 10 min"], "tactical", seed=5).run.facts.notes
+    assert notes == "synthetic: steps of its own, twin tactical, seed 5"
