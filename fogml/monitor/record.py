@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 
@@ -12,7 +12,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL, Z90
-from fogml.models.base import OUTSIDE, DriftModel
+from fogml.models.base import OUTSIDE, DriftModel, Evaluation
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
 from fogml.monitor.figures import Averages, run_figures
@@ -137,67 +137,16 @@ def record_run(
         If the run is empty, of another unit or axis, does not state the attitude that tells Earth rate while
         the model knows it, holds fewer than `LEAST_WINDOWS` averages, or one value in every sample.
     """
-    # A model whose training did not tell Earth rate holds it, so that no run's is taken off once more.
-    earth_known = model.card_.earth_known
-    means = _Means(averaging_s)
-    columns: dict[str, hashlib._Hash] = {}
-    first: Run | None = None
-    samples = outside = 0
-    last_s = 0.0
-    low, high = np.inf, -np.inf
+    recording = _Recording(model, averaging_s)
     for block, evaluation in evaluate_blocks(model, blocks, any_unit=any_unit):
-        first = first or block
-        if earth_known and not block.earth_known:
-            raise InputError(
-                f"{block.name}: states no latitude and input_axis, but the model was trained with Earth rate "
-                "known: the run's bias would hold it; state both in the run's side file"
-            )
-        for name, values in block.columns.items():
-            columns.setdefault(name, hashlib.sha256()).update(np.ascontiguousarray(values).data)
-        moving = turning(block) if "rate" in block.columns else np.zeros(len(block), dtype=bool)
-        kept = evaluation.full & evaluation.settled
-        if moving.any():
-            kept &= ~transition_mask(block)
-        half = model.intervals_.half_width(LEVEL, evaluation.excess)
-        warmth = leading_temperature(block)
-        reference = block.reference_deg_h if earth_known else 3600.0 * block.rate
-        means.add(
-            block.time,
-            kept,
-            left=block.gyro_deg_h - reference - (0.0 if block.facts.compensated else evaluation.drift),
-            temperature=np.zeros(len(block)) if warmth is None else warmth,
-            reference=reference,
-            half=half,
-            moving=moving.astype(np.float64),
-            outside=evaluation.outside.astype(np.float64),
-        )
-        samples += len(block)
-        low, high = min(low, float(block.gyro.min())), max(high, float(block.gyro.max()))
-        outside += int(np.sum(evaluation.flag == OUTSIDE))
-        last_s = float(block.time[-1])
+        recording.add(block, evaluation)
+    first = recording.first
     if first is None:
         raise InputError("the run holds no samples, there is nothing to monitor")
-    if low == high:
-        raise InputError(f"{first.name}: {dead_words(low)}; it is not kept, record it again")
-    time, mean = means.values()
-    rest = mean["moving"] == 0.0
-    used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(time), dtype=bool)
-    # Outside training the model states little that could change; a run of nothing else tells as little.
-    inside = used & (mean["outside"] < 0.5)
-    is_inside = bool(inside.sum() >= LEAST_WINDOWS)
-    used = inside if is_inside else used
-    if used.sum() < LEAST_WINDOWS:
-        raise InputError(
-            f"{first.name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows are full; "
-            f"{LEAST_WINDOWS} are needed to tell what the model leaves, record longer or set --averaging"
-        )
-    facts = first.facts
-    digest = hashlib.sha256()
-    sha = model_hash(model)
-    for text in (facts.unit or "", facts.axis or "", sha, first.gyro_unit, repr(averaging_s)):
-        digest.update(f"{text}\0".encode())
-    for name in sorted(columns):
-        digest.update(f"{name}\0{columns[name].hexdigest()}".encode())
+    if recording.low == recording.high:
+        raise InputError(f"{first.name}: {dead_words(recording.low)}; it is not kept, record it again")
+    time, mean = recording.means.values()
+    used, is_inside = _used(mean, first.name, averaging_s)
     half = mean["half"][used]
     told = run_figures(
         Averages(
@@ -206,28 +155,106 @@ def record_run(
             mean["temperature"],
             mean["reference"],
             used,
-            moving=~rest,
+            moving=mean["moving"] != 0.0,
             averaging_s=averaging_s,
         ),
         model,
         outside_deviation=0.0 if is_inside else float(np.sqrt(np.mean(half**2))) / Z90,
     )
+    facts, sha = first.facts, model_hash(model)
+    beyond = float(np.mean(np.abs(mean["left"][used]) > half))
     return RunRecord(
-        key=digest.hexdigest(),
+        key=recording.key(sha),
         unit=facts.unit or "",
         axis=facts.axis or "",
         run=first.name,
         model=sha,
         started=facts.started.isoformat() if facts.started else "",
         monitored=datetime.now(UTC).isoformat(timespec="seconds"),
-        span_s=last_s - float(first.time[0]),
-        samples=float(samples),
-        outside_training=outside / samples,
-        beyond_interval=float(np.mean(np.abs(mean["left"][used]) > half)) if earth_known else float("nan"),
+        span_s=recording.last_s - float(first.time[0]),
+        samples=float(recording.samples),
+        outside_training=recording.outside / recording.samples,
+        beyond_interval=beyond if recording.earth_known else float("nan"),
         half_width=float(half.mean()),
         averaging_s=averaging_s,
         **told,
     )
+
+
+class _Recording:
+    """What is gathered of a recording that comes in blocks."""
+
+    def __init__(self, model: DriftModel, averaging_s: float) -> None:
+        self.model = model
+        # A model whose training did not tell Earth rate holds it, so that no run's is taken off once more.
+        self.earth_known = model.card_.earth_known
+        self.means = _Means(averaging_s)
+        self.columns: dict[str, hashlib._Hash] = {}
+        self.first: Run | None = None
+        self.samples = self.outside = 0
+        self.last_s = 0.0
+        self.low, self.high = np.inf, -np.inf
+
+    def add(self, block: Run, evaluation: Evaluation) -> None:
+        """Add a block and what the model tells of it."""
+        self.first = self.first or block
+        if self.earth_known and not block.earth_known:
+            raise InputError(
+                f"{block.name}: states no latitude and input_axis, but the model was trained with Earth rate "
+                "known: the run's bias would hold it; state both in the run's side file"
+            )
+        for name, values in block.columns.items():
+            self.columns.setdefault(name, hashlib.sha256()).update(np.ascontiguousarray(values).data)
+        moving = turning(block) if "rate" in block.columns else np.zeros(len(block), dtype=bool)
+        kept = evaluation.full & evaluation.settled
+        if moving.any():
+            kept &= ~transition_mask(block)
+        warmth = leading_temperature(block)
+        reference = block.reference_deg_h if self.earth_known else 3600.0 * block.rate
+        self.means.add(
+            block.time,
+            kept,
+            left=block.gyro_deg_h - reference - (0.0 if block.facts.compensated else evaluation.drift),
+            temperature=np.zeros(len(block)) if warmth is None else warmth,
+            reference=reference,
+            half=self.model.intervals_.half_width(LEVEL, evaluation.excess),
+            moving=moving.astype(np.float64),
+            outside=evaluation.outside.astype(np.float64),
+        )
+        self.samples += len(block)
+        self.low, self.high = min(self.low, float(block.gyro.min())), max(self.high, float(block.gyro.max()))
+        self.outside += int(np.sum(evaluation.flag == OUTSIDE))
+        self.last_s = float(block.time[-1])
+
+    def key(self, sha: str) -> str:
+        """Digest of the recording, its unit and the model's `sha`."""
+        assert self.first is not None
+        facts, digest = self.first.facts, hashlib.sha256()
+        about = (facts.unit or "", facts.axis or "", sha, self.first.gyro_unit, repr(self.means.window_s))
+        for text in about:
+            digest.update(f"{text}\0".encode())
+        for name in sorted(self.columns):
+            digest.update(f"{name}\0{self.columns[name].hexdigest()}".encode())
+        return digest.hexdigest()
+
+
+def _used(mean: Mapping[str, FloatArray], name: str, averaging_s: float) -> tuple[BoolArray, bool]:
+    """Averages that tell what is left, shape (m,), and whether they are inside training.
+
+    Those at rest where there are enough. Outside training the model states little that could change; a run
+    of nothing else tells as little.
+    """
+    rest = mean["moving"] == 0.0
+    used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(rest), dtype=bool)
+    inside = used & (mean["outside"] < 0.5)
+    is_inside = bool(inside.sum() >= LEAST_WINDOWS)
+    used = inside if is_inside else used
+    if used.sum() < LEAST_WINDOWS:
+        raise InputError(
+            f"{name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows are full; "
+            f"{LEAST_WINDOWS} are needed to tell what the model leaves, record longer or set --averaging"
+        )
+    return used, is_inside
 
 
 class _Means:
