@@ -143,14 +143,14 @@ def _judge(
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.sweep_page import standing
+    from fogml.report.sweep_page import parts_held_out, standing
 
     for text in standing(values["winner"]):
         terminal.say(text)
     counts = values["counts"]
     terminal.say(
         f"{counts['complete'] + counts['pruned']} trials finished, {counts['pruned']} of them pruned or "
-        f"refused, judged on held-out {values['folds']}."
+        f"refused, judged on {parts_held_out(values)}."
     )
     rows = []
     for place in values["pareto"][:20]:

@@ -69,10 +69,16 @@ def history(study: Mapping[str, Any]) -> Drawing:
         figure,
         alt=f"Held-out rms of {plural(len(whole), 'trial')}; the best has {number(low)} deg/h.",
         caption=(
-            f"Each trial's rms on held-out {study['folds']}, single averaged rows, so noise is in it. "
+            f"Each trial's rms on {parts_held_out(study)}; their noise is in it. "
             "Ticks below: trials that were pruned or could not be fitted."
         ),
     )
+
+
+def parts_held_out(study: Mapping[str, Any]) -> str:
+    """What trials are judged on, with the averaging time, which is not that of a test run's figures."""
+    seconds = study.get("held_out_averaging_s")
+    return f"held-out {study['folds']}" + ("" if seconds is None else f", {averages(seconds)}")
 
 
 def importance_bars(study: Mapping[str, Any]) -> Drawing | None:
@@ -236,8 +242,8 @@ def _verdict(study: Mapping[str, Any], judgement: Judgement | None) -> list[str]
     finished = counts["complete"] + counts["pruned"]
     sentences = [
         *standing(best),
-        f"Of {plural(finished, 'trial')}, {_name(best)} wins: {number(best['rms'])} deg/h rms on held-out "
-        f"{study['folds']}, with {plural(best['bytes'], 'byte')} of weights.",
+        f"Of {plural(finished, 'trial')}, {_name(best)} wins: {number(best['rms'])} deg/h rms on "
+        f"{parts_held_out(study)}, with {plural(best['bytes'], 'byte')} of weights.",
     ]
     if judgement is None:
         sentences.append("No test run was stated, so it is not judged yet.")
@@ -256,7 +262,7 @@ def _tiles(study: Mapping[str, Any], judgement: Judgement | None) -> list[Tile]:
         Tile(
             "Trials", str(counts["complete"] + counts["pruned"]), "", f"{counts['pruned']} pruned or refused"
         ),
-        Tile("Winner, held out", number(best["rms"]), "deg/h", f"rms on held-out {study['folds']}"),
+        Tile("Winner, held out", number(best["rms"]), "deg/h", f"rms on {parts_held_out(study)}"),
         Tile("Weights", str(best["bytes"]), "byte", f"{best['operations']} operations per sample"),
     ]
     if judgement is not None:

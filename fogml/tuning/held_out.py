@@ -21,7 +21,7 @@ from fogml.models.feature_model import FeatureModel
 from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.names import make_model
 from fogml.models.regressors import parameter_count, weight_bytes
-from fogml.models.table import RunRows, TrainingTable, usable_rows
+from fogml.models.table import RunRows, TrainingTable, longest_interval_s, usable_rows
 from fogml.models.trial import averaged_rows, bare_table, held_out_prediction
 from fogml.models.weighing import Weighed
 from fogml.runs.run import Run
@@ -163,6 +163,11 @@ class HeldOut:
         )
         self.by_run = by_run
 
+    @property
+    def averaging_s(self) -> float:
+        """Time that a row held out is averaged over [s]."""
+        return self._table.averaging_s
+
     @cached_property
     def _table(self) -> TrainingTable:
         """The rows without features."""
@@ -170,7 +175,8 @@ class HeldOut:
             RunRows(np.empty((int(used.sum()), 0)), run.error_deg_h[used], run.time[used])
             for run, used in zip(self.runs, self._used, strict=True)
         ]
-        table = bare_table(averaged_rows(rows))
+        averaged = averaged_rows(rows)
+        table = replace(bare_table(averaged), averaging_s=longest_interval_s(averaged))
         if len(table) < 2 * _BLOCKS:
             raise InputError(
                 f"the training runs hold {len(table)} rows with full windows; give longer runs, or shorter "

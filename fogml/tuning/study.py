@@ -98,6 +98,7 @@ class _Attributes(BaseModel):
     fold_errors: list[list[FiniteFloat]] = []
     fold_rows: list[list[FiniteFloat]] = []
     fold_means: list[list[FiniteFloat]] | None = None
+    averaging_s: FiniteFloat | None = None
     bytes: FiniteFloat | None = None
     operations: FiniteFloat | None = None
     reason: str = ""

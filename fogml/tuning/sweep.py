@@ -83,6 +83,7 @@ def study_json(
         "storage": shown(storage),
         "objectives": [{"name": name, "unit": OBJECTIVES[name]} for name in objectives],
         "folds": "runs" if len(runs) > 1 else "blocks of time",
+        "held_out_averaging_s": best.user_attrs.get("averaging_s"),
         "train": [Path(run).name for run in runs],
         "test": [Path(run).name for run in test],
         "seed": seed,

@@ -75,6 +75,7 @@ def _evaluate(study: optuna.Study, plan: Plan, held_out: HeldOut, trial: optuna.
         "model": choice.model,
         "features": choice.features,
         "parameters": choice.parameters,
+        "averaging_s": held_out.averaging_s,
     }
     for name, value in told.items():
         trial.set_user_attr(name, value)

@@ -3,7 +3,9 @@
 import numpy as np
 
 from fogml.models.table import TrainingTable
-from fogml.tuning.held_out import _apart
+from fogml.tuning.held_out import HeldOut, _apart
+from fogml.tuning.space import Choice, Space
+from tests.tuning.world import SPACE, runs
 
 
 def table_of(times):
@@ -22,3 +24,13 @@ def test_an_average_goes_with_the_nearest_row_of_its_run():
     ]
     np.testing.assert_array_equal(_apart(averages, rows, held), expected)
     assert 0 < np.sum(expected) < len(expected)
+
+
+def test_errors_are_of_averages_over_the_time_that_is_stated():
+    """White noise of 0.02 deg/h in samples of 4 s is 0.02 sqrt(4 / T) in averages over T."""
+    held = HeldOut(runs(2, 9000), Space.model_validate(SPACE))
+    results = list(held.judged(Choice("polynomial", "T, dT[first]", {})))
+    rows = np.concatenate([one.rows for one in results])
+    rms = np.sqrt(np.average(np.concatenate([one.squared_errors for one in results]), weights=rows))
+    assert held.averaging_s > 20.0
+    np.testing.assert_allclose(rms, 0.02 * np.sqrt(4.0 / held.averaging_s), rtol=0.1)
