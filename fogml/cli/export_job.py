@@ -134,7 +134,8 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
         rows.append(["operations per sample", str(report["operations_per_sample"])])
     if pruning := report.get("pruning"):
         text = f"{pruning['bytes_whole']} to {report['bytes_weights']} bytes, "
-        text += f"rms {pruning['rms_difference']:.2g} deg/h"
+        text += f"rms {pruning['rms_difference']:.2g} deg/h off the model, "
+        text += f"which moves by {pruning['model_deviation']:.2g} there ({pruning['chosen_on']})"
         rows.append(["pruned", text])
     accuracy = report.get("accuracy", {})
     if "rms_model" in accuracy:
@@ -153,3 +154,6 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
     if beyond := report.get("beyond_the_box"):
         rows.append(["beyond the trained box", beyond])
     terminal.table(f"{lead}{report['model']['kind']} exported to {settings.out}", ["", ""], rows)
+    if pruning and pruning["rms_difference"] > 0.5 * pruning["model_deviation"]:
+        how = "allow more" if settings.train else "allow more, or prune on its training runs (--train)"
+        terminal.note(f"so few bytes leave out more than half of what the model moves by: {how}")

@@ -144,6 +144,7 @@ def _pruned(
         "terms": [len(whole.names), len(plan.names)],
         "rms_difference": float(np.sqrt(np.mean(off**2))),
         "largest_difference": float(np.max(np.abs(off))),
+        "model_deviation": float(np.std(whole.value(columns))),
     }
 
 

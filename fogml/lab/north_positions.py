@@ -186,8 +186,9 @@ def _stays(run: Run, order_deg: Sequence[float], sense: str, settle_s: float, to
     missing = sorted(set(range(1, count + 1)) - set(position[position > 0].astype(int).tolist()))
     if missing:
         named = ", ".join(str(number) for number in missing)
+        column = "position" if "position" in run.columns else "angle"
         raise InputError(
-            f"{run.name}, column 'position': no samples in position {named}; all of 1 to {count} are needed"
+            f"{run.name}, column '{column}': no samples in position {named}; all of 1 to {count} are needed"
         )
     edges = np.concatenate([[0], np.flatnonzero(np.diff(position) != 0.0) + 1, [len(position)]])
     stay = np.repeat(np.arange(len(edges) - 1), np.diff(edges))

@@ -51,6 +51,14 @@ def test_training_runs_prune_and_judge(invoke_json, model, run_files, tmp_path):
     assert values["accuracy"]["on"] == "training folds"
 
 
+def test_bytes_that_hold_little_of_the_model_are_told(invoke, model, tmp_path):
+    told = [
+        invoke("export", model, "--to", "json", "--bytes", n, "-o", tmp_path / n).stderr
+        for n in ("16", "400")
+    ]
+    assert "more than half" in told[0] and "--train" in told[0] and "more than half" not in told[1]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

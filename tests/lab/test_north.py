@@ -252,6 +252,14 @@ def own_seek(
     return Run("own", columns, Facts(latitude=latitude))
 
 
+def test_a_table_that_stands_still_is_told_by_its_own_column() -> None:
+    columns = dict(own_seek(1, 12.0, 40.0, walk=0.0, drift=np.zeros_like).columns)
+    del columns["position"]
+    columns["angle"] = np.zeros(2700)
+    with pytest.raises(InputError, match=r"'angle': no samples in position 2, 3, 4"):
+        north_from_positions(Run("still", columns, Facts(latitude=40.0)))
+
+
 @pytest.mark.parametrize("latitude", [89.6, -89.85])
 def test_near_a_pole_an_azimuth_that_is_noise_says_so(latitude: float) -> None:
     azimuths, inside, told = np.linspace(0.0, 340.0, 30), 0, 0
