@@ -8,6 +8,9 @@ import shutil
 import pytest
 import yaml
 
+from fogml.cli.export_job import ExportJobSettings, _print
+from fogml.cli.terminal import Terminal
+
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 
 
@@ -51,12 +54,13 @@ def test_training_runs_prune_and_judge(invoke_json, model, run_files, tmp_path):
     assert values["accuracy"]["on"] == "training folds"
 
 
-def test_bytes_that_hold_little_of_the_model_are_told(invoke, model, tmp_path):
-    told = [
-        invoke("export", model, "--to", "json", "--bytes", n, "-o", tmp_path / n).stderr
-        for n in ("16", "400")
-    ]
-    assert "more than half" in told[0] and "--train" in told[0] and "more than half" not in told[1]
+def test_bytes_that_hold_little_of_the_model_are_told(invoke_json, model, tmp_path, capsys):
+    out = tmp_path / "small"
+    report = invoke_json("export", model, "--to", "json", "--bytes", "16", "-o", out)
+    for share, told in ((0.4, False), (0.6, True)):
+        report["pruning"]["rms_difference"] = share * report["pruning"]["model_deviation"]
+        _print(ExportJobSettings(model=[str(model)], out=str(out)), report, Terminal())
+        assert ("or prune on its training runs (--train)" in capsys.readouterr().err) == told
 
 
 @pytest.mark.parametrize(
