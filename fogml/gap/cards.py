@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.gap.card_form import Fitted, Form, Optimum, Root, optimum
 from fogml.gap.catalogue import nodes_of, signature_of
 from fogml.gap.field import Field, Member, apart
@@ -36,12 +37,32 @@ class Card:
 
 
 def cards_of(found: Inference, judged: Judgement) -> dict[str, Card]:
-    """Each cause's card, by its effect."""
-    cards = {}
+    """Each cause's card, by its effect; of one that the model has already what it has too little."""
+    cards, had = {}, {declared.id: setting.amplitude for declared, setting in found.plant.on}
     for cause in judged.causes:
-        beside = beside_others(found, judged.best.members, cause)
-        cards[cause.ids[0]] = card_of(cause.ids[0], found.field, beside, told_by_family(found, cause))
+        id = cause.ids[0]
+        if id in had and not found.scene.candidates[id].in_proportion:
+            whole = whole_card(found, judged, cause)
+            value = replace(whole.value, amplitude=whole.value.amplitude - had[id])
+            cards[id] = replace(whole, value=value)
+        else:
+            beside = beside_others(found, judged.best.members, cause)
+            cards[id] = card_of(id, found.field, beside, told_by_family(found, cause))
     return cards
+
+
+def whole_card(found: Inference, judged: Judgement, cause: Cause) -> Card:
+    """A cause's card of all of it, with what the model has of it already."""
+    id = cause.ids[0]
+    beside = beside_others(found, judged.best.members, cause)
+    data = replace(beside, data=beside.data + made_already(found, id))
+    return card_of(id, found.field, data, told_by_family(found, cause))
+
+
+def made_already(found: Inference, id: str) -> FloatArray:
+    """What the model has of an effect already makes of the fit runs, whitened, shape (n,)."""
+    had = (found.field.made(d, held.amplitude, held.shape) for d, held in found.plant.on if d.id == id)
+    return next(had, np.zeros(len(found.field.base.data)))
 
 
 def beside_others(found: Inference, members: Sequence[Member], cause: Cause) -> LinearGaussian:

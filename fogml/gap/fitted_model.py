@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.gap.card_form import Form, Optimum, Root, optimum
-from fogml.gap.cards import Card, beside_others, card_of, in_form, told_by_family
+from fogml.gap.cards import Card, in_form, made_already, whole_card
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.model import EffectValue, TwinModel, with_effects
@@ -46,11 +46,13 @@ def fitted_model(
     as a replay has them; of one that the model had already it is all of it.
     """
     held, candidates = found.field, found.scene.candidates
-    whole, more = _of_all(found, judged, named, cards)
+    had = {declared.id for declared, _ in found.plant.on}
+    by_id = {cause.ids[0]: cause for cause in named}
+    whole = {id: whole_card(found, judged, c) if id in had else cards[id] for id, c in by_id.items()}
     values = {id: card.value for id, card in whole.items()}
     others = [m for c in named if not in_form(candidates[c.ids[0]]) for m in c.members]
     base, design = held.beside(others), held.design(others)
-    base = replace(base, data=base.data + more)
+    base = replace(base, data=base.data + np.sum([made_already(found, id) for id in by_id], axis=0))
     forms = []
     for id, value in values.items():
         if in_form(declared := candidates[id]):
@@ -94,25 +96,6 @@ def _together(
     covariance = with_all @ best.covariance @ with_all.T + (known * with_form) @ (known * with_form).T
     covariance[: len(mean), : len(mean)] += alone.covariance
     return Posterior(mean, covariance)
-
-
-def _of_all(
-    found: Inference, judged: Judgement, named: Sequence[Cause], cards: Mapping[str, Card]
-) -> tuple[dict[str, Card], FloatArray]:
-    """Cards of all of each effect, and what the model had of them already, whitened, shape (n,)."""
-    held, had = found.field, {declared.id: (declared, setting) for declared, setting in found.plant.on}
-    whole = {cause.ids[0]: cards[cause.ids[0]] for cause in named}
-    more = np.zeros(len(held.base.data))
-    for cause in named:
-        id = cause.ids[0]
-        if id in had:
-            declared, setting = had[id]
-            own = held.made(declared, setting.amplitude, setting.shape)
-            more += own
-            beside = beside_others(found, judged.best.members, cause)
-            data = replace(beside, data=beside.data + own)
-            whole[id] = card_of(id, held, data, told_by_family(found, cause))
-    return whole, more
 
 
 def _fit(
