@@ -105,7 +105,7 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
     names, labels = found["names"], found["units"]
     rows = -(-len(names) // _COLUMNS)
     figure = make_subplots(
-        rows=rows, cols=_COLUMNS, shared_xaxes=True, horizontal_spacing=0.1, vertical_spacing=0.12 / rows
+        rows=rows, cols=_COLUMNS, shared_xaxes=True, horizontal_spacing=0.13, vertical_spacing=0.12 / rows
     )
     values, errors = np.array(found["values"]), np.array(found["se"])
     for place, name in enumerate(names):

@@ -10,7 +10,14 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.intervals import LEVEL
 from fogml.models.box import LEAST_SPAN_DEGC, ways_moved
-from fogml.validation.reasons import Grade, Reason, gained_reasons, implausible_reasons, still_reason
+from fogml.validation.reasons import (
+    Grade,
+    Reason,
+    gained_reasons,
+    implausible_reasons,
+    still_reason,
+    unit_reasons,
+)
 from fogml.validation.results import Judgement, RunJudgement
 
 SEEN = "seen_in_training"
@@ -128,6 +135,7 @@ def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
             if (still := still_reason(run, asked.mostly_still, what)) is not None:
                 yield still
             yield from implausible_reasons(run)
+    yield from unit_reasons(judgement.train, judgement.test)
     yield from _not_judged(judgement)
     yield from _one_way(judgement)
     yield from _one_temperature(judgement)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -51,6 +51,31 @@ def implausible_reasons(run: RunJudgement) -> Iterator[Reason]:
                 "makes of another run.",
                 f"Put {told} of {run.run} right, or make sure of it, and train and judge again.",
             )
+
+
+UNITS_APART = 1000.0
+"""What two runs of one gyro move by, and their noise, differ by less unless one is in deg/s: 3600 times."""
+
+
+def unit_reasons(train: Sequence[RunJudgement], test: Sequence[RunJudgement]) -> Iterator[Reason]:
+    """What speaks against a model where a run seems to be in another unit than those trained on."""
+    for run in test:
+        for other in train:
+            moves = run.before.bias_stability, other.before.bias_stability
+            noises = run.floor, other.floor
+            if min(*moves, *noises) <= 0.0:
+                continue
+            apart = [a / b for a, b in (moves, noises)]
+            if min(apart) > UNITS_APART or max(apart) < 1.0 / UNITS_APART:
+                yield Reason(
+                    "do_not_use",
+                    f"{run.run} and {other.run} seem to be in different units",
+                    f"{run.run} moves by {moves[0]:.3g} deg/h and {other.run} by {moves[1]:.3g}, and their "
+                    f"noise is as far apart ({noises[0]:.2g} and {noises[1]:.2g}): is one of them in deg/s, "
+                    "3600 times deg/h?",
+                    "Put the unit of the output right, and train and judge again.",
+                )
+                return
 
 
 def gained_reasons(run: RunJudgement) -> Iterator[Reason]:

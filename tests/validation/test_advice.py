@@ -8,9 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fogml.models.names import make_model
 from fogml.report.verdict import advice_words
 from fogml.runs.findings import Finding
+from fogml.runs.run import Run
 from fogml.validation.advice import Asked, advice_on, coverage, which_to_use
+from fogml.validation.judge import judge
 from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement, RunJudgement
 from tests.report.judgements import FLOOR, judgement
@@ -210,3 +213,16 @@ def test_report_and_words_say_the_same() -> None:
     assert values["verdict"] == "do_not_use" and list(told["reasons"]) == values["reasons"]
     assert told["words"] == "Do not use: trained one way" and told["sign"] == "✗"
     assert values["test"][0]["coverage"] == coverage(judged.test[0])
+
+
+@pytest.mark.parametrize(("times", "told"), [(3600.0, True), (1.0 / 3600.0, True), (20.0, False)])
+def test_a_run_in_another_unit_is_told_from_one_that_moves_more(times: float, told: bool) -> None:
+    time = 10.0 * np.arange(1500)
+    warm = 20.0 - 30.0 * np.cos(time / 2400.0)
+    drift = 5.0 + 0.05 * warm + np.random.default_rng(1).normal(0.0, 0.05, (2, len(time)))
+    runs = [
+        Run(name, {"time": time, "gyro": scale * gyro, "T": warm})
+        for name, scale, gyro in zip("ab", (1.0, times), drift, strict=True)
+    ]
+    judged = judge(make_model("polynomial", "T").fit(runs[0]), *runs)
+    assert ("different units" in advice_on(judged).brief) == told
