@@ -232,7 +232,7 @@ def residuals_in_time(judgements: Mapping[str, Judgement], names: Sequence[str],
     series = shown[0][1].series
     shade(figure, segments_of(series.time / per_unit, series.regime))
     figure.update_xaxes(title_text=f"time [{unit}]", row=len(shown), col=1)
-    style.styled(figure, 110 + 130 * len(shown))
+    style.styled(figure, 130 + 130 * len(shown), margin={"t": 54})  # regimes' names below the tools
     left = [f"{name} {number(judged.after.rms)} deg/h" for name, judged in shown]
     first = shown[0][1]
     return Drawing(

@@ -17,6 +17,7 @@ from fogml.report.index_page import index_page
 from fogml.report.inspect_page import inspect_page
 from fogml.report.noise_page import noise_page
 from fogml.report.page import Drawing, _Drawings
+from fogml.report.tables import metrics_table
 from fogml.report.train_page import train_page
 from fogml.report.words import number
 from fogml.runs.findings import Finding
@@ -149,6 +150,19 @@ def test_a_note_that_holds_for_many_runs_is_told_once() -> None:
     text = Page(train_page(replace(judged, train=runs[:1], test=runs[1:], model=model))).text
     assert text.count(cut) == 1
     assert f"b.csv, c.csv and d.csv: {cut}" in text
+
+
+def test_bias_stability_of_10_s_stands_once() -> None:
+    run = judged_run()
+    run = replace(
+        run,
+        before=replace(run.before, bias_stability_10s=0.2),
+        after=replace(run.after, bias_stability_10s=0.1),
+    )
+    names = [
+        [row.cells[0] for row in metrics_table(replace(run, averaging_s=s)).rows] for s in (100.0, 10.11)
+    ]
+    assert ["Bias stability, 10 s averages" in told for told in names] == [True, False]
 
 
 def test_coefficients_and_candidates_are_shown_where_told() -> None:
