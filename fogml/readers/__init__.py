@@ -123,6 +123,6 @@ def extra_hint(reader: Reader, path: Path) -> str:
     """What to say of a file whose reader's package is missing."""
     package = reader.package.partition(".")[0]
     return (
-        f"{path.name}: is a {reader.label} file; reading it needs the package {package}: "
+        f"{path.name}: its format is {reader.label}; reading it needs the package {package}: "
         f"pip install 'fogml-lab[{reader.extra}]', or in fogml's source pip install -e '.[{reader.extra}]'"
     )

@@ -78,7 +78,9 @@ def file_format(path: Path) -> str:
         return kind
     label = stated[0].label if stated else "CSV"
     do = "unpack it first" if kind == "packed" else f"rename it to '{path.stem}{reader.suffixes[0]}'"
-    raise InputError(f"{path.name}: is a {reader.label} file by its content, and named as {label}; {do}")
+    raise InputError(
+        f"{path.name}: its content is of the format {reader.label}, and it is named as {label}; {do}"
+    )
 
 
 def _of_shipped(path: Path) -> str:

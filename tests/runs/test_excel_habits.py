@@ -107,6 +107,7 @@ def test_is_read(tmp_path, name):
 
 
 def test_a_workbook_is_read(tmp_path):
+    pytest.importorskip("python_calamine")
     pytest.importorskip("xlsxwriter")
     write_book(path := tmp_path / "book.xlsx")
     np.testing.assert_allclose(read_run(path).temperature("T"), INNER, atol=1e-4)
@@ -117,6 +118,7 @@ RUN = [HEADER.split(","), *([float(cell) for cell in row.split(",")] for row in 
 
 def book_of(path, sheets):
     """A workbook of sheets: name, whether it is hidden, rows."""
+    pytest.importorskip("python_calamine")
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
     book.remove(book.active)
@@ -164,6 +166,7 @@ def test_formulas_without_values_are_told(tmp_path, columns, place):
 
 
 def test_an_empty_column_without_formulas_and_formulas_with_values_are_told_apart(tmp_path):
+    pytest.importorskip("python_calamine")
     xlsxwriter = pytest.importorskip("xlsxwriter")
     path = tmp_path / "book.xlsx"
     with xlsxwriter.Workbook(str(path)) as book:
