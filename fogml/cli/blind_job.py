@@ -13,6 +13,7 @@ from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSetti
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, counted
 from fogml.json_files import write_json
+from fogml.numerals import short
 from fogml.outputs import folder_to_fill, whole_file, whole_folder
 
 if TYPE_CHECKING:
@@ -250,6 +251,6 @@ def _print(values: dict[str, Any], method: str, terminal: Terminal) -> None:
     terminal.table(title, ["figure", "reached", "wanted", "n"], rows)
     for one in values["gates"]:
         bound = "at least" if one["at_least"] else "at most"
-        value = "no value" if one["value"] is None else f"{one['value']:.4g}"
+        value = "no value" if one["value"] is None else f"{short(one['value'], 4)}"
         outcome = "met" if one["met"] else "NOT met"
         terminal.say(f"gate {one['key']}: {value}, {bound} {one['limit']:g}: {outcome}")

@@ -9,6 +9,7 @@ from fogml.cli.runs import open_runs
 from fogml.cli.settings import SHIPPED
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.train_job import TrainSettings, fit_and_judge, say_advice, write_results
+from fogml.numerals import short
 from fogml.outputs import whole_folder
 from fogml.validation.judge import judge
 from fogml.validation.report_json import judgement_json
@@ -83,7 +84,7 @@ def _print(judgements: dict[str, Judgement], settings: DemoSettings, terminal: T
         rows.append([axis, *(number(value) for value in figures), model])
     averaging = judgements[AXES[0]].test[0].averaging_s
     terminal.table(
-        f"A MEMS unit, trained going up, judged going down ({averaging:.3g} s averages, deg/h)",
+        f"A MEMS unit, trained going up, judged going down ({short(averaging)} s averages, deg/h)",
         ["axis", "rms before", "after", "bias stability before", "after", "noise floor", "features chosen"],
         rows,
     )

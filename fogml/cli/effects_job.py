@@ -9,6 +9,7 @@ from typing import Any
 
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.twin_commands import EffectsSettings
+from fogml.numerals import short
 from fogml.outputs import whole_folder
 from fogml.twin.effect import Effect
 from fogml.twin.registry import effect, effects
@@ -122,7 +123,7 @@ def _print_pictures(id: str, terminal: Terminal) -> None:
     for picture in pictures(declared, _best_first(declared, _TERMINAL_PROGRAMMES)):
         low, high = float(picture.values.min()), float(picture.values.max())
         what = f" in {next(iter(picture.places))}" if picture.places else ""
-        span = f"{number(low)} to {number(high)} {picture.unit}{what}, {picture.hours[-1]:.3g} h"
+        span = f"{number(low)} to {number(high)} {picture.unit}{what}, {short(picture.hours[-1])} h"
         terminal.say("")
         terminal.say(f"{picture.programme}: {span}")
         if low != high:

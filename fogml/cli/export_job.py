@@ -12,6 +12,7 @@ from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.json_files import write_json
+from fogml.numerals import short
 from fogml.outputs import whole_folder
 
 if TYPE_CHECKING:
@@ -108,14 +109,17 @@ def _print_tables(settings: ExportJobSettings, report: dict[str, Any], terminal:
         low, high = told["range_degc"]
         rms, largest = told["rms_difference_at_rest"], told["largest_difference_at_rest"]
         rows = [
-            ["over", f"{told['thermometer']}, {low:.4g} to {high:.4g} degC"],
+            ["over", f"{told['thermometer']}, {short(low, 4)} to {short(high, 4)} degC"],
             ["off from the model at rest",
-             f"rms {rms:.2g}, largest {largest:.2g} deg/h"],
+             f"rms {short(rms, 2)}, largest {short(largest, 2)} deg/h"],
         ]  # fmt: skip
         if "breakpoints" in told:
             rows.append(["breakpoints", f"{told['breakpoints']}, {told['bytes']} bytes"])
         if loss := told.get("accuracy"):
-            text = f"{loss['rms_model']:.4g} deg/h with the model, {loss['rms_exported']:.4g} with the table"
+            text = (
+                f"{short(loss['rms_model'], 4)} deg/h with the model, "
+                f"{short(loss['rms_exported'], 4)} with the table"
+            )
             rows.append([f"rms of {loss['averaging_s']:g} s averages on the training runs", text])
         if told["leaves_out"]:
             rows.append(["leaves out", ", ".join(told["leaves_out"])])
@@ -128,19 +132,22 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
     rows = [
         ["number format", report["dtype"]],
         ["weights", f"{report['bytes_weights']} bytes"],
-        ["largest difference in the trained box", f"{difference:.2g} deg/h (allowed {tolerance:.2g})"],
+        [
+            "largest difference in the trained box",
+            f"{short(difference, 2)} deg/h (allowed {short(tolerance, 2)})",
+        ],
     ]
     if report["operations_per_sample"] is not None:
         rows.append(["operations per sample", str(report["operations_per_sample"])])
     if pruning := report.get("pruning"):
         text = f"{pruning['bytes_whole']} to {report['bytes_weights']} bytes, "
-        text += f"rms {pruning['rms_difference']:.2g} deg/h off the model, "
-        text += f"which moves by {pruning['model_deviation']:.2g} there ({pruning['chosen_on']})"
+        text += f"rms {short(pruning['rms_difference'], 2)} deg/h off the model, "
+        text += f"which moves by {short(pruning['model_deviation'], 2)} there ({pruning['chosen_on']})"
         rows.append(["pruned", text])
     accuracy = report.get("accuracy", {})
     if "rms_model" in accuracy:
-        text = f"{accuracy['rms_model']:.4g} deg/h with the model, "
-        text += f"{accuracy['rms_exported']:.4g} with the export"
+        text = f"{short(accuracy['rms_model'], 4)} deg/h with the model, "
+        text += f"{short(accuracy['rms_exported'], 4)} with the export"
         rows.append([f"rms of {accuracy['averaging_s']:g} s averages on training folds", text])
     if size := report.get("cortex_m4"):
         library = size["library_flash_bytes"]

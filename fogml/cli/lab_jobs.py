@@ -16,6 +16,7 @@ from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows
+from fogml.numerals import short
 from fogml.report.words import duration, to_error
 
 
@@ -77,7 +78,7 @@ def _figures(value: float, error: float | None, ends: list[float] | None) -> lis
 
     places = max(-math.floor(math.log10(error)), 0) if error else 0
     shown = [told(end) for end in ends] if ends else ["–", "–"]
-    return [told(value), "–" if error is None else f"{error:.2g}", *shown]
+    return [told(value), "–" if error is None else f"{short(error, 2)}", *shown]
 
 
 def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:

@@ -11,6 +11,7 @@ from fogml.cli.twin_commands import PlanSettings
 from fogml.gap.planning.plan import plan_runs
 from fogml.gap.planning.plan_result import Plan, plan_values, programme_file, simulation_file
 from fogml.json_files import write_json
+from fogml.numerals import short
 from fogml.outputs import whole_folder
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.simulate import DEFAULT_FACTS
@@ -75,7 +76,7 @@ def _simulation(place: int, twin: str, facts: Facts) -> str:
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
     for run in values["runs"]:
-        terminal.say(f"{run['programme']}: {run['hours']:.3g} h, {run['summary']}")
+        terminal.say(f"{run['programme']}: {short(run['hours'])} h, {run['summary']}")
     if values["wanted"]:
         rows = [
             [e["name"], e["unit"], number(e["usual"]), number(e["prior_se"]), number(e["se"])]
@@ -87,7 +88,7 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         told = "enough to tell" if item["enough"] else "not enough to tell"
         what = " and ".join(item["separates"])
         terminal.say(
-            f"{what}: distance {item['distance']:.3g}, {told} (from {values['least_distance']:g} on)"
+            f"{what}: distance {short(item['distance'])}, {told} (from {values['least_distance']:g} on)"
         )
     if values["rehearsal"]:
         terminal.table("What a diagnosis of these runs would name", *rehearsal_rows(values["rehearsal"]))

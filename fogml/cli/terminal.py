@@ -17,6 +17,7 @@ import click
 
 from fogml.escaping import terminal_text, visible
 from fogml.json_files import json_text
+from fogml.numerals import short
 from fogml.processes import heed_interrupt
 
 _LINE_EVERY_S = 10.0
@@ -268,4 +269,4 @@ def number(value: float | None) -> str:
     """
     if value is None:
         return "–"
-    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{short(value, 4)}"

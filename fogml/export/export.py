@@ -41,6 +41,7 @@ from fogml.export.settings import (
 from fogml.export.sklearn_graph import export_graph, is_graph_alone
 from fogml.export.storage import stored_plan, weight_bytes
 from fogml.models.base import DriftModel
+from fogml.numerals import short
 from fogml.outputs import scratch_folder
 from fogml.runs.run import Run
 
@@ -118,7 +119,7 @@ def _agreeing(plan: Plan, model: DriftModel, seed: int) -> None:
     size = 1.0 + float(np.abs(plan.network.weights).sum())
     if not error <= _PLAN_NOISE * size:
         raise InputError(
-            f"export: the model's plain form differs from the model by {error:.3g} deg/h; it is too badly "
+            f"export: the model's plain form differs from the model by {short(error)} deg/h; it is too badly "
             "conditioned to be written down: train it again with fewer terms"
         )
 

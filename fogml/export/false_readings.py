@@ -12,6 +12,7 @@ from fogml.export.plan import Plan
 from fogml.export.points import box_points
 from fogml.features.atoms import RATE_UNIT_S, Atom
 from fogml.features.own import Recursion
+from fogml.numerals import short
 from fogml.runs.columns import is_temperature
 
 SECONDS = (0.0, 60.0, 300.0)
@@ -86,13 +87,15 @@ def false_reading_lines(told: dict[str, Any] | None) -> list[str]:
         return []
     first, *_, last = told["largest_error"]
     return [
-        f"readings      believed within {told['step_degC']:.3g} degC and {told['rate_degC_s']:.3g} degC/s of "
+        f"readings      believed within {short(told['step_degC'])} degC and "
+        f"{short(told['rate_degC_s'])} degC/s of "
         "the last good one;",
-        f"              a false one that passes is off by up to {first['off_degC']:.3g} degC and makes, at",
-        f"              flag 0, an error of up to {first['one_deg_h']:.3g} deg/h, a spell of such "
-        f"{first['spell_deg_h']:.3g} deg/h;",
-        f"              after {last['missing_s']:g} s without a good one {last['off_degC']:.3g} degC, "
-        f"{last['one_deg_h']:.3g} and {last['spell_deg_h']:.3g} deg/h",
+        f"              a false one that passes is off by up to {short(first['off_degC'])} degC and "
+        "makes, at",
+        f"              flag 0, an error of up to {short(first['one_deg_h'])} deg/h, a spell of such "
+        f"{short(first['spell_deg_h'])} deg/h;",
+        f"              after {last['missing_s']:g} s without a good one {short(last['off_degC'])} degC, "
+        f"{short(last['one_deg_h'])} and {short(last['spell_deg_h'])} deg/h",
     ]
 
 

@@ -31,6 +31,7 @@ from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
 from fogml.features.operators import BEYOND, LAG, PLAY
 from fogml.features.traced import BITS
+from fogml.numerals import short
 from fogml.signals.clock import EDGE_TOLERANCE, LEAST_SHARE, told_share
 from fogml.signals.kernel_windows import Kernel
 
@@ -295,5 +296,5 @@ def fixed_point_lines(proven: float | None, plan: Plan) -> list[str]:
             "              window of one's own that tells no rate of the few samples that it holds;",
             "              export.json has what was measured",
         ]
-    told = f"worst case    fixed point is at most {proven:.3g} deg/h off in the trained box, by proof"
+    told = f"worst case    fixed point is at most {short(proven)} deg/h off in the trained box, by proof"
     return [told, "              where its windows of one's own are full"] if filling else [told]

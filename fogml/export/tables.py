@@ -20,6 +20,7 @@ from fogml.export.settings import SCHEMA, report_tail
 from fogml.export.static_curve import StaticCurve
 from fogml.intervals import LEVEL
 from fogml.models.base import DriftModel
+from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.yaml_text import read_yaml
 
@@ -106,8 +107,9 @@ def export_tables(
     for axis, error in errors.items():
         if settings.tolerance is not None and error > settings.tolerance:
             raise InputError(
-                f"export: axis {axis}: what is written is off by {error:.3g} deg/h from the model at rest, "
-                f"more than the tolerance of {settings.tolerance:.3g} deg/h. Nothing was written"
+                f"export: axis {axis}: what is written is off by {short(error)} deg/h from the model "
+                "at rest, "
+                f"more than the tolerance of {short(settings.tolerance)} deg/h. Nothing was written"
             )
     return {
         "schema": SCHEMA,

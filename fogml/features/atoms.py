@@ -12,7 +12,8 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, known_are
 from fogml.features.operators import DEFAULT_WINDOW, MEMORY_OPERATORS, Window, windowed_values
 from fogml.features.own import Function, Recursion, own_operator
-from fogml.features.signal import TIME_ON, Signal, number_text
+from fogml.features.signal import TIME_ON, Signal
+from fogml.numerals import number_text
 from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 from fogml.signals.clock import Clock

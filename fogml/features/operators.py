@@ -25,8 +25,8 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, known_are
 from fogml.features.own import Function, Recursion, State, declare, own_window
-from fogml.features.signal import number_text
 from fogml.features.traced import decayed, forgotten, larger, smaller, where
+from fogml.numerals import number_text
 from fogml.signals import windows
 from fogml.signals.clock import EDGE_TOLERANCE, EXPONENTIAL_SPAN, Clock
 from fogml.signals.kernel_windows import Kernel, kernel_rate

@@ -10,6 +10,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, did_you_mean
+from fogml.numerals import number_text
 from fogml.runs.columns import KNOWN, REPLAYED, TIME_ON, coil_sensor_number, column_spec, is_temperature
 from fogml.runs.run import Run
 
@@ -198,11 +199,6 @@ def known_temperatures() -> str:
     return (
         ", ".join(sorted((name for name in KNOWN if is_temperature(name)), key=_ORDER.index)) + ", T1, T2 ..."
     )
-
-
-def number_text(value: float) -> str:
-    """Shortest text that reads back as the same number, without a trailing ``.0``."""
-    return repr(float(value)).removesuffix(".0")
 
 
 def _sort_key(part: tuple[str, float]) -> tuple[bool, int, int, str]:

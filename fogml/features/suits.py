@@ -8,6 +8,7 @@ from fogml.errors import InputError
 from fogml.features.atoms import Atom
 from fogml.features.features import Features
 from fogml.features.signal import TIME_ON
+from fogml.numerals import short
 from fogml.runs.run import Run
 
 
@@ -28,7 +29,8 @@ def unsuited(atom: Atom, runs: Sequence[Run]) -> tuple[str, str] | None:
         coarsest = max(runs, key=lambda run: run.sample_s)
         if atom.memory > longest:
             return (
-                f"a time constant of {atom.memory:g} s, but the longest training run is {longest:.4g} s",
+                f"a time constant of {atom.memory:g} s, but the longest training run is "
+                f"{short(longest, 4)} s",
                 "record longer, or state a time constant within the runs",
             )
         if atom.operator == "lag" and atom.memory < coarsest.sample_s * (1.0 - 1e-6):
@@ -42,8 +44,9 @@ def unsuited(atom: Atom, runs: Sequence[Run]) -> tuple[str, str] | None:
         span = max(float(v.max()) for v in values) - min(float(v.min()) for v in values)
         if 2.0 * atom.memory > span:
             return (
-                f"a half width of {atom.memory:g}, but {atom.signal.text} spans {span:.4g} in the training "
+                f"a half width of {atom.memory:g}, but {atom.signal.text} spans {short(span, 4)} in "
+                "the training "
                 "runs, less than the play",
-                f"state at most {0.5 * span:.3g}, or train over a wider range",
+                f"state at most {short(0.5 * span)}, or train over a wider range",
             )
     return None

@@ -22,6 +22,7 @@ from fogml.fleet.shares import (
 )
 from fogml.gap.result import NAMED
 from fogml.gap.settings import Priors
+from fogml.numerals import short
 from fogml.signals.restricted import random_effects
 from fogml.strict import Strict, strictly
 
@@ -249,7 +250,7 @@ def _apart(
         sure = [(label, one) for label, one in has if one.probability >= NAMED]
         values, errors = [one.amplitude for _, one in sure], [one.se for _, one in sure]
         for (label, one), p in zip(sure, apart(values, errors)):
-            size = f"{one.amplitude:.3g} {one.unit}, the line's is {cause['amplitude']:.3g}"
+            size = f"{short(one.amplitude)} {one.unit}, the line's is {short(cause['amplitude'])}"
             tested.append((label, effect, size, float(p)))
         rare = cause["prevalence_ci90"][1] < 0.5 and len(sure) <= max(1.0, rules.rare * cause["units_told"])
         for label, _ in sure:

@@ -26,6 +26,7 @@ from fogml.models.mixed_effects import OWN_PARTS, MixedEffects, SizePriors, line
 from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.prior import Prior, agreement, posterior
 from fogml.models.table import TrainingTable
+from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 
@@ -207,8 +208,8 @@ class SharedModel(MixedEffectsModel):
             return [*super()._fit_notes(), f"{self._alone}; it is left to its own runs"]
         noise = self._member.noise.model
         told = (
-            f"noise of the averages: N {noise.N:.2g} deg/sqrt(h), B {noise.B:.2g} deg/h, "
-            f"K {noise.K:.2g} deg/h/sqrt(h), shift of a run {self._member.shift:.2g} deg/h"
+            f"noise of the averages: N {short(noise.N, 2)} deg/sqrt(h), B {short(noise.B, 2)} deg/h, "
+            f"K {short(noise.K, 2)} deg/h/sqrt(h), shift of a run {short(self._member.shift, 2)} deg/h"
         )
         drawn = (
             "constants are drawn to the fleet's, and the trained box is the fleet's and the unit's together"

@@ -15,6 +15,7 @@ from fogml.fleet.diagnosis import RULES, line_diagnosis
 from fogml.fleet.shares import discoveries
 from fogml.fleet.tasks import DONE
 from fogml.intervals import SIGMA_PER_MEDIAN
+from fogml.numerals import short
 
 FLEET_SCHEMA = "fogml.fleet/1"
 _OUTLYING = 3.5
@@ -114,7 +115,7 @@ def _outliers(
                 told.append(
                     {
                         "unit": label_of(unit),
-                        "why": f"leaves {np.exp(value - middle):.2g} times the fleet's median rms",
+                        "why": f"leaves {short(np.exp(value - middle), 2)} times the fleet's median rms",
                     }
                 )
     if constants is not None:
@@ -128,7 +129,8 @@ def _outliers(
                 told.append(
                     {
                         "unit": label,
-                        "why": f"its {what} is {own[place].max():.2g} standard deviations from the fleet's",
+                        "why": f"its {what} is {short(own[place].max(), 2)} standard deviations from the "
+                        "fleet's",
                     }
                 )
     return told

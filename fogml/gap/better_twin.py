@@ -19,6 +19,7 @@ from fogml.gap.result_parts import Counterfactual, Course
 from fogml.gap.rows import READ
 from fogml.gap.settings import Reported
 from fogml.gap.where import averages
+from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.signals.noise_expectation import floor_square
 from fogml.twin.draws import parameter_values
@@ -123,7 +124,7 @@ def better_twin(
         matrices.append(fitted.covariance * np.outer(scale, scale))
         deviations = scale * np.sqrt(np.diag(fitted.covariance))
         sizes = ", ".join(
-            f"{name.removeprefix('plant.')} {value:.3g} ± {sd:.2g}"
+            f"{name.removeprefix('plant.')} {short(value)} ± {short(sd, 2)}"
             for name, value, sd in zip(fitted.names, scale, deviations)
         )
         told.append(f"Plant fitted to recorded temperatures: {sizes}")

@@ -18,6 +18,7 @@ from fogml.gap.result_parts import CauseShare, HowFar
 from fogml.gap.rows import Rows
 from fogml.gap.where import averages
 from fogml.intervals import TAILS, Z90
+from fogml.numerals import short
 from fogml.runs.regimes import Regimes
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
@@ -188,7 +189,7 @@ def _own_noise(rows: Rows, found: Inference, made: Sequence[FloatArray]) -> tupl
     chance = 3.0 * 1.4 / math.sqrt(len(rows))
     if abs(math.log(own / usual)) < max(chance, math.log(settings.unit_factor)):
         return model, ""
-    apart = f"{own / usual:.2g} times" if own > usual else f"only {own / usual:.2g} times"
+    apart = f"{short(own / usual, 2)} times" if own > usual else f"only {short(own / usual, 2)} times"
     said = f"white noise of this run is {apart} that of the others; its floor is its own"
     return replace(model, N=own), said
 

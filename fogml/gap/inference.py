@@ -20,6 +20,7 @@ from fogml.gap.rows import Rows
 from fogml.gap.scene import Scene, outstanding_lines
 from fogml.gap.search import Explanation, Search
 from fogml.gap.settings import Priors, RowSettings
+from fogml.numerals import short
 from fogml.runs.checks import refuse_dead
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -191,7 +192,8 @@ def _check_motion(scene: Scene, least_degc: float) -> None:
     moved = max(float(np.ptp(r.temperature)) for r in scene.fit)
     if moved < least_degc and not any(np.any(r.run.rate) for r in scene.fit):
         raise InputError(
-            f"{', '.join(r.run.name for r in scene.fit)}: temperature moves by {moved:.2g} degC in all; "
+            f"{', '.join(r.run.name for r in scene.fit)}: temperature moves by {short(moved, 2)} "
+            "degC in all; "
             f"a diagnosis needs a run in which it moves by {least_degc:g} degC or more"
         )
 

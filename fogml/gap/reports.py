@@ -16,6 +16,7 @@ from fogml.gap.posterior import Judgement
 from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Unknown, Verdict
 from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries
 from fogml.gap.where import averages
+from fogml.numerals import short
 from fogml.signals.bases import rate
 from fogml.signals.noise_expectation import floor_square
 from fogml.signals.whiteness import whiteness
@@ -143,9 +144,10 @@ def assumed(found: Inference, constants: Sequence[ConstantFit]) -> tuple[str, ..
         off = abs(fit.value - fit.prior_mean) / fit.prior_sd
         if fit.name in setting.widened and off > setting.priors.noise.far_off:
             said.append(
-                f"{fit.name} = {fit.value:.4g} {fit.unit} is {off:.3g} standard deviations off what was "
+                f"{fit.name} = {short(fit.value, 4)} {fit.unit} is {short(off)} standard deviations "
+                "off what was "
                 f"expected ({fit.prior_mean:g} ± {fit.prior_sd:g}): a unit, a sign or the twin may be wrong. "
-                f"Its prior was widened {setting.widened[fit.name]:.3g} times for the rest."
+                f"Its prior was widened {short(setting.widened[fit.name])} times for the rest."
             )
     for rows in setting.scene.runs:
         if rows.masked:
@@ -212,8 +214,8 @@ def headline(
     for f in (f for f in shown if f.named):
         title = titles[f.effect].title
         others = f" (or {', '.join(f.others)})" if f.others else ""
-        size = f"{f.amplitude.value:.3g} {f.amplitude.unit}"
-        usual = f", {f.times_usual:.2g} times the usual most" if (f.times_usual or 0.0) > 1.0 else ""
+        size = f"{short(f.amplitude.value)} {f.amplitude.unit}"
+        usual = f", {short(f.times_usual, 2)} times the usual most" if (f.times_usual or 0.0) > 1.0 else ""
         share = f", {f.share:.0%} of the gap" if f.share is not None else ""
         look = f"; look at the {f.place}" if f.place else ""
         said.append(f"{title}{others}: {f.probability:.0%} probable, {size}{usual}{share}{look}.")
@@ -221,7 +223,9 @@ def headline(
             said.append(f"{title} {_since(found, f.onset)}, and not before.")
         if f.grows is not None:
             way = "grows" if f.grows * f.amplitude.value > 0.0 else "fades"
-            said.append(f"{title} {way} from run to run, by {abs(f.grows):.2g} {f.amplitude.unit} a day.")
+            said.append(
+                f"{title} {way} from run to run, by {short(abs(f.grows), 2)} {f.amplitude.unit} a day."
+            )
         elif not f.consistent and len(f.by_run) > 1:
             said.append(f"{title}: the runs do not agree in its size.")
     for f in (f for f in shown if f.left_out):

@@ -23,6 +23,7 @@ from fogml.gap.model import AnyModel
 from fogml.gap.result import Diagnosis, Estimate
 from fogml.gap.search import Explanation
 from fogml.gap.settings import Priors
+from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.signals.restricted import random_effects
 from fogml.twin.twin import Twin
@@ -78,13 +79,14 @@ class UnitsDiagnosis:
         """What is shared, in sentences."""
         said = []
         for c in self.shared:
-            sizes = ", ".join(f"{u} {s.value:.3g} ± {s.se:.2g}" for u, s in c.sizes.items())
+            sizes = ", ".join(f"{u} {short(s.value)} ± {short(s.se, 2)}" for u, s in c.sizes.items())
             line = f"{c.effect}: {c.probability:.0%} probable in all units; {sizes} {c.unit}"
             if c.next_unit is not None and c.mean is not None:
                 low, high = c.next_unit
                 line += (
-                    f"; mean {c.mean.value:.3g} ± {c.mean.se:.2g}, {c.spread:.2g} from unit to unit: "
-                    f"the next unit's lies between {low:.3g} and {high:.3g} {c.unit} (90 %)"
+                    f"; mean {short(c.mean.value)} ± {short(c.mean.se, 2)}, {short(c.spread, 2)} "
+                    "from unit to unit: "
+                    f"the next unit's lies between {short(low)} and {short(high)} {c.unit} (90 %)"
                 )
             said.append(line + ".")
         return tuple(said)

@@ -12,6 +12,7 @@ from fogml.errors import InputError, listed
 from fogml.lab.acceptance_rows import TERMS, Limits
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_pieces import earth_deg_h, find_plateaus, merged
+from fogml.numerals import short
 from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
 from fogml.runs.turning import least_rate_deg_s, white_noise
@@ -191,7 +192,7 @@ def _over(found: Repeatability) -> str:
 
 def _repeated(found: SpreadOverRuns, over: str) -> Figure:
     low, high = found.after_ci90
-    return Figure(found.before, found.after, over, f"90 % of {low:.3g} to {high:.3g}", ci90=(low, high))
+    return Figure(found.before, found.after, over, f"90 % of {short(low)} to {short(high)}", ci90=(low, high))
 
 
 def small_rates(run: Run) -> bool:
@@ -226,7 +227,7 @@ def _of_rates(before: Sequence[Run], after: Sequence[Run]) -> Iterator[tuple[str
         unseen, seen = (None if one[key] is None else one[key]["below_deg_h"] for one in told)
         if unseen is not None and seen is not None:
             over = told[1][key]["above_deg_h"]
-            remark = f"above {over:.3g}" if over else "the smallest that was tested"
+            remark = f"above {short(over)}" if over else "the smallest that was tested"
             yield key, Figure(unseen, seen, names[key], remark, at_most=not over)
 
 
@@ -248,7 +249,7 @@ def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) ->
         terms = [one[letter] for one in told]
         low, high = terms[0]["ci"]
         if all(term["value"] is not None for term in terms):
-            remark = f"90 % of {low:.3g} to {high:.3g}"
+            remark = f"90 % of {short(low)} to {short(high)}"
             own = tuple(terms[1]["ci"])
             yield key, Figure(terms[0]["value"], terms[1]["value"], pair[0].name, remark, ci90=own)
         elif all(term["ci"][1] for term in terms):

@@ -18,6 +18,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.lab.misalignment_errors import ROUND_OFF, ScaleDrift, Slopes
 from fogml.lab.misalignment_states import pairs_of
+from fogml.numerals import short
 from fogml.signals.distributions import variances_sf
 
 _ITERATIONS = 20  # of Gauss and Newton at most: three or four do
@@ -112,6 +113,6 @@ def drift_words(drift: ScaleDrift | None) -> tuple[str, ...]:
     if drift is None:
         return ()
     return (
-        f"the scale factor drifts by {1e6 * drift.share:.3g} ppm over the test (standard error "
-        f"{1e6 * drift.se:.2g}), as with temperature: taken off, so that K is its mean over the test",
+        f"the scale factor drifts by {short(1e6 * drift.share)} ppm over the test (standard error "
+        f"{short(1e6 * drift.se, 2)}), as with temperature: taken off, so that K is its mean over the test",
     )

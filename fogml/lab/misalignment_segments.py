@@ -12,6 +12,7 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG
+from fogml.numerals import short
 from fogml.runs.raw_table import numbered_row
 from fogml.runs.run import Run
 from fogml.runs.transitions import MARGIN_BEYOND_S, time_to_rate_s, transition_mask
@@ -159,7 +160,8 @@ def _check_left(rows: Rows, run: Run, kept: BoolArray, rest: BoolArray) -> None:
         last = int(np.append(starts, len(kept))[np.argmax(gone) + 1]) - 1
         raise InputError(
             f"{rows.source}, {rows.row_name(first)}: nothing is left of the rest of "
-            f"{run.time[last] - run.time[first]:.4g} s, as {time_to_rate_s(run) + MARGIN_BEYOND_S:.3g} s and "
+            f"{short(run.time[last] - run.time[first], 4)} s, as "
+            f"{short(time_to_rate_s(run) + MARGIN_BEYOND_S)} s and "
             "more are cut about each change of the rate, by the longest time that table and gyro take to "
             "settle; let rests last longer, or the table accelerate faster"
         )

@@ -14,6 +14,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.numerals import short
 from fogml.signals.distributions import variances_isf, variances_sf
 
 STATES = (1, 2, 3, 4)
@@ -211,7 +212,7 @@ def check_order(
         return None, ()
     return p_value, (
         "the states disagree by more than noise, and no other order of them fits: the gyro was not seated "
-        f"alike in all of them, or a tilt or a turn is not what is stated (probability {p_value:.1g})",
+        f"alike in all of them, or a tilt or a turn is not what is stated (probability {short(p_value, 1)})",
     )
 
 

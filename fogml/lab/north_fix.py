@@ -9,6 +9,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.lab.north import DriftError, horizontal_rate
 from fogml.lab.north_schemes import wrapped
+from fogml.numerals import short
 from fogml.runs.run import Run
 
 ANY_DEG = 180.0 / float(np.sqrt(3.0))
@@ -108,7 +109,7 @@ def fix_notes(fix: NorthFix, covariance: FloatArray | None, bent_se_deg: float |
         return told
     if fix.se_deg == ANY_DEG:
         told.append(
-            f"the positions don't tell north: the Earth rate that they show, {fix.horizontal_deg_h:.3g} "
+            f"the positions don't tell north: the Earth rate that they show, {short(fix.horizontal_deg_h)} "
             "deg/h, is within its noise; stay longer in each"
         )
     bend, bend_se, bent = fix.bend_deg_h_h2, fix.bend_se, fix.bent_deg
@@ -119,7 +120,7 @@ def fix_notes(fix: NorthFix, covariance: FloatArray | None, bent_se_deg: float |
         told.append(
             f"the bias bends during the seek, as at start-up ({abs(bend) / bend_se:.1f} standard errors), "
             "which the azimuth's standard error does not hold: with the bend taken out (--method "
-            f"bend-observing) it is {bent:.4f} ± {bent_se_deg:.2g} deg"
+            f"bend-observing) it is {bent:.4f} ± {short(bent_se_deg, 2)} deg"
         )
     return told
 
@@ -137,7 +138,8 @@ def set_up_notes(
         )
     if latitude is None:
         return [
-            f"no latitude is stated: the horizontal Earth rate is the one seen, {fix.horizontal_deg_h:.4g} "
+            "no latitude is stated: the horizontal Earth rate is the one seen, "
+            f"{short(fix.horizontal_deg_h, 4)} "
             "deg/h",
             *told,
         ]
@@ -147,7 +149,8 @@ def set_up_notes(
         tolerance += 5.0 * float(np.sqrt(covariance[:2, :2].trace()))
     if abs(fix.horizontal_deg_h - expected) > tolerance:
         told.append(
-            f"the positions show {fix.horizontal_deg_h:.4g} deg/h of Earth rate, {expected:.4g} deg/h were "
+            f"the positions show {short(fix.horizontal_deg_h, 4)} deg/h of Earth rate, "
+            f"{short(expected, 4)} deg/h were "
             f"expected at latitude {latitude:g} deg: the axis is not level, the scale factor is off, or the "
             "positions are not what they are called"
         )

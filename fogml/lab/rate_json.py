@@ -27,6 +27,7 @@ from fogml.lab.rate_tests import (
     step_answers,
     zero_answers,
 )
+from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.twin.coil import LayeredCoil, lead_sensitivity, midpoint_sensitivity, radial_sensitivity
@@ -187,13 +188,14 @@ def _of_drift(run: Run, plateaus: Plateaus, most: float = 0.1, steady_degC: floa
     over = "the temperature is not recorded"
     if warmth is not None:
         span = float(np.ptp(warmth[int(plateaus.start[0]) : int(plateaus.stop[-1])]))
-        over = f"the temperature moves by {span:.2g} degC"
+        over = f"the temperature moves by {short(span, 2)} degC"
         moved *= span > steady_degC
     if moved <= most:
         return ()
     return (
         f"The rates grow or fall over the test, and {over}: a scale factor that drifts by 1 ppm meanwhile is "
-        f"told {moved:.2g} ppm off its middle, with a nonlinearity of {bent:.2g} ppm that is none; no "
+        f"told {short(moved, 2)} ppm off its middle, with a nonlinearity of {short(bent, 2)} ppm "
+        "that is none; no "
         "interval holds that. Let the rates come again the other way round.",
     )
 

@@ -84,9 +84,10 @@ def _response(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     rows = []
     band = values["bandwidth"]
     if band is not None:
-        between = number(band["half_power_hz"])
-        remark = "gain 0.707, between the frequencies tested"
-        if band["half_power_hz"] is None:
+        if band["half_power_hz"] is not None:
+            between = number(band["half_power_hz"])
+            remark = "gain 0.707, between the frequencies tested"
+        else:
             scale = (values["scale_factor"] or {"scale_factor": 1.0})["scale_factor"]
             gains = sorted((one["frequency_hz"], one["gain"]) for one in values["gains"])
             low = gains[0][1] < HALF_POWER * scale

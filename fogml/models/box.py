@@ -11,6 +11,7 @@ from fogml.features.box import Box
 from fogml.features.features import Features
 from fogml.features.operators import most_beyond
 from fogml.features.slices import SavedSlices
+from fogml.numerals import short
 from fogml.runs.run import Run
 
 
@@ -111,20 +112,21 @@ def refusals(runs: Sequence[Run]) -> list[str]:
     span = high - low
     if span == 0.0:
         return [
-            f"one temperature only, {low:.4g} degC: nothing can be told of drift over temperature; record a "
+            f"one temperature only, {short(low, 4)} degC: nothing can be told of drift over "
+            "temperature; record a "
             "ramp up and a ramp down over the range of use"
         ]
     steps = [np.diff(np.unique(T)) for T in temperatures]
     resolution = min((float(step.min()) for step in steps if len(step)), default=0.0)
     if span < LEAST_STEPS * resolution:
         return [
-            f"T spans {span:.3g} degC, {span / resolution:.0f} steps of its sensor: that tells no slope; "
+            f"T spans {short(span)} degC, {span / resolution:.0f} steps of its sensor: that tells no slope; "
             "record a wider range, or with a finer sensor"
         ]
     if span < LEAST_SPAN_DEGC:
         return [
-            f"T spans {span:.3g} degC in the training runs, under {LEAST_SPAN_DEGC:g} degC: what is "
-            f"compensated holds at {0.5 * (low + high):.3g} degC alone; record a ramp up and a ramp down "
+            f"T spans {short(span)} degC in the training runs, under {LEAST_SPAN_DEGC:g} degC: what is "
+            f"compensated holds at {short(0.5 * (low + high))} degC alone; record a ramp up and a ramp down "
             "over the range of use"
         ]
     return []

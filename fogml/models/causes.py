@@ -31,6 +31,7 @@ from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import linear_regressor
 from fogml.models.row_noise import noise_of_rows, stretches_of
 from fogml.models.table import RunRows, TrainingTable, table_of_rows
+from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
@@ -249,7 +250,7 @@ class CauseModel(FeatureModel):
         return self._solved(GroupedRows(table, self._groups, self._noise), table)
 
     def _fit_notes(self) -> list[str]:
-        told = ", ".join(f"{name} {length:.3g}" for name, length in self.lengths_.items())
+        told = ", ".join(f"{name} {short(length)}" for name, length in self.lengths_.items())
         return [f"whitened lengths of causes, 3 and less being little: {told}"] if told else []
 
     def describe(self) -> dict[str, Any]:

@@ -30,7 +30,6 @@ from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
-from fogml.features.signal import number_text
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
@@ -42,6 +41,7 @@ from fogml.models.linear import LinearRegressor
 from fogml.models.row_noise import noise_covariance
 from fogml.models.table import RunRows, TrainingTable, row_count
 from fogml.models.tall_least_squares import PIECE_ROWS, Part
+from fogml.numerals import number_text
 from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.strict import Strict, strictly

@@ -37,6 +37,7 @@ from fogml.models.mixed_effects_model import averages_of, composed, offered, sta
 from fogml.models.table import TrainingTable, run_rows
 from fogml.models.trial import fit_candidate
 from fogml.models.weights import intervals_of, weights_of
+from fogml.numerals import short
 from fogml.runs.run import Run
 
 STATIC = "cubic in T"
@@ -75,7 +76,10 @@ class Weighed:
 
     def told(self) -> str:
         """A note for the card."""
-        rms = f"{self.left:.4g} deg/h rms on parts left out, the training mean {self.mean_left:.4g} deg/h"
+        rms = (
+            f"{short(self.left, 4)} deg/h rms on parts left out, the training mean "
+            f"{short(self.mean_left, 4)} deg/h"
+        )
         if not any(self.weights.values()):
             return f"no compensation: nothing beats the training mean on parts left out; it leaves {rms}"
         shares = ", ".join(

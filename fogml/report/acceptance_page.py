@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from fogml.numerals import short
 from fogml.report import style
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table, columns_of
@@ -101,7 +102,7 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     about = [("Tested", listed(tested, 2) if dates else "date not stated")]
     if temperatures:
         about.append(("Temperatures", f"{number(min(temperatures))} to {number(max(temperatures))} °C"))
-    about.append(("Averages", f"{values['averaging_s']:.4g} s"))
+    about.append(("Averages", f"{short(values['averaging_s'], 4)} s"))
     about.append(("Model", "none: output as it is" if model is None else str(model["kind"])))
     if limits is not None:
         by = [limits["document"] or limits["file"], limits["customer"]]

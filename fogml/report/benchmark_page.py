@@ -8,6 +8,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from fogml.benchmark.score import ALL, FIGURES
+from fogml.numerals import short
 from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.style import log_axis
@@ -58,7 +59,7 @@ def benchmark_page(values: Mapping[str, Any]) -> str:
 def _averages(values: Mapping[str, Any]) -> str:
     """What figures of drift are averages over, by data."""
     told = {case["group"]: case["averaging_s"] for case in values["cases"]["drift"].values()}
-    spans = ", ".join(f"{group} {span:.3g} s" for group, span in told.items())
+    spans = ", ".join(f"{group} {short(span)} s" for group, span in told.items())
     start = values["round"]["design"]["settling_s"]
     return f"of drift: {spans}; the first {start:g} s of a held-out run enter no figure"
 

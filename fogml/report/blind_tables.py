@@ -9,6 +9,7 @@ import plotly.graph_objects as go
 
 from fogml.blind.folders import DIAGNOSIS
 from fogml.blind.methods import ABSTAIN, BASELINES
+from fogml.numerals import short
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.tables import Table, columns_of
@@ -62,7 +63,7 @@ def wanted_text(row: Mapping[str, Any]) -> str:
     unit = " s" if row["format"] == "seconds" else ""
 
     def told(value: float) -> str:
-        return f"{100 * value:.3g} %" if row["format"] == "percent" else f"{stated(value)}{unit}"
+        return f"{short(100 * value)} %" if row["format"] == "percent" else f"{stated(value)}{unit}"
 
     if low is not None and high is not None:
         return f"{told(low)} … {told(high)}"

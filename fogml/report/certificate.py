@@ -9,6 +9,7 @@ from datetime import date as Date
 import numpy as np
 from markupsafe import Markup
 
+from fogml.numerals import short
 from fogml.report import style
 from fogml.report.page import render
 from fogml.report.style import time_unit
@@ -125,7 +126,7 @@ def _sheet(judgement: Judgement) -> Sheet:
         ("Attitude", _attitude(worst)),
         ("Judged on" if len(judgement.test) == 1 else "Worst run", _span(worst)),
         ("Rates", _rates(worst)),
-        ("Averages", f"{worst.averaging_s:.4g} s"),
+        ("Averages", f"{short(worst.averaging_s, 4)} s"),
         ("Bias relative to", reference_of(worst)),
     ]
     return Sheet(
@@ -211,12 +212,12 @@ def _span(run: RunJudgement) -> str:
     hours = float(np.ptp(series.time) + run.averaging_s) / 3600.0
     low, high = float(series.temperature.min()), float(series.temperature.max())
     begun = f"started {started.isoformat(sep=' ', timespec='minutes')}, " if started else "start not stated, "
-    return f"{begun}{hours:.3g} h, T {signed(low)} to {signed(high)} °C"
+    return f"{begun}{short(hours)} h, T {signed(low)} to {signed(high)} °C"
 
 
 def _rates(run: RunJudgement) -> str:
     steepest = float(np.abs(run.series.rate).max(initial=0.0))
-    told = f"temperature up to {steepest:.2g} °C/min"
+    told = f"temperature up to {short(steepest, 2)} °C/min"
     if run.table_rates is None:
         return f"{told}; table rate not recorded"
     low, high = run.table_rates
@@ -225,7 +226,7 @@ def _rates(run: RunJudgement) -> str:
 
 def signed(value: float) -> str:
     """A number in few digits with a typeset sign."""
-    return f"{value:.4g}".replace("-", "\N{MINUS SIGN}")
+    return f"{short(value, 4)}".replace("-", "\N{MINUS SIGN}")
 
 
 def card_line(card: dict[str, str]) -> list[str]:

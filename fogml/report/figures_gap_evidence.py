@@ -57,7 +57,7 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
                     "pattern": {"shape": pattern, "fillmode": "overlay", "fgcolor": "white", "size": 6},
                 },
                 customdata=[e.gain for e in rows],
-                hovertemplate="%{y}: %{customdata:.3g} nats<extra></extra>",
+                hovertemplate="%{y}: %{short(customdata)} nats<extra></extra>",
                 row=1,
                 col=1,
             )

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 
 from fogml.fleet.summary import label_of
 from fogml.intervals import Z90
+from fogml.numerals import short
 from fogml.report import style
 from fogml.report.figures_fleet import serial_axis
 from fogml.report.page import Drawing
@@ -121,7 +122,7 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
             line={"color": style.TRAINING, "width": 1},
             marker={"size": 7, "color": style.BLUE},
             customdata=[run["run"] for run in unit["runs"]],
-            hovertemplate="%{customdata}<br>%{y:.4g}<extra></extra>",
+            hovertemplate="%{customdata}<br>%{short(y, 4)}<extra></extra>",
             showlegend=False,
             row=row,
             col=1,
@@ -217,7 +218,7 @@ def evidence(unit: Mapping[str, Any], limit: float) -> Drawing:
     style.styled(figure, 300)
     return Drawing(
         figure,
-        alt=f"Evidence of change after each run, at most {max(values):.3g}, against a limit of {limit:g}.",
+        alt=f"Evidence of change after each run, at most {short(max(values))}, against a limit of {limit:g}.",
         caption=(
             f"Where nothing changes, the evidence passes the limit once in {limit:g} runs or less often. "
             "After an alarm it begins anew with the runs since the change."

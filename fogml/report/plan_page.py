@@ -93,7 +93,7 @@ def errors_drawing(values: Mapping[str, Any]) -> Drawing | None:
             y=names,
             mode="markers",
             marker={"symbol": "diamond", "size": 11, "color": style.BLUE},
-            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
+            hovertemplate="%{y}: %{short(x)}<extra></extra>",
         )
     )
     figure.add_vline(x=1.0, line=style.FLOOR_LINE)

@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 from plotly.subplots import make_subplots
 
+from fogml.numerals import short
 from fogml.signals.drawn import gap_starts
 
 # Okabe and Ito's palette, distinct under the common colour deficiencies
@@ -208,7 +209,7 @@ def _plain(value: float) -> str:
     power = math.floor(math.log10(value) + 1e-9)
     if -4 <= power <= 4:
         return np.format_float_positional(value, trim="-")
-    mantissa = f"{value / 10.0**power:.2g}·"
+    mantissa = f"{short(value / 10.0**power, 2)}·"
     return f"{'' if mantissa == '1·' else mantissa}10<sup>{power}</sup>".replace("-", "−")
 
 

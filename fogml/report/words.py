@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fogml.numerals import short
+
 _LABELS = {
     "bias": "Bias",
     "bias_stability": "Bias stability",
@@ -110,7 +112,7 @@ def listed(names: Sequence[str], most: int = 4) -> str:
 
 def averages(seconds: float) -> str:
     """The averaging time in words: ``100 s averages``."""
-    return f"{seconds:.4g} s averages"
+    return f"{short(seconds, 4)} s averages"
 
 
 def duration(seconds: float) -> str:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.numerals import short
 from fogml.runs.findings import Finding
 from fogml.signals import large
 
@@ -63,10 +64,10 @@ class EvenClock:
         """What was rebuilt, and how well it is known."""
         gaps = {0: "no gap", 1: "1 gap"}.get(self.gaps, f"{self.gaps} gaps")
         rounding = 1e-6 * self.interval_s
-        good = "rounding" if self.error_s < rounding else f"{self.error_s:.2g} s"
+        good = "rounding" if self.error_s < rounding else f"{short(self.error_s, 2)} s"
         return (
             f"clock rebuilt from the mean interval of {self.interval_s:.6g} s (drift "
-            f"{round(self.drift_ppm, 3) + 0.0:.3g} ppm over the run, {gaps} kept), each time good to "
+            f"{short(round(self.drift_ppm, 3) + 0.0)} ppm over the run, {gaps} kept), each time good to "
             f"{good}, and all of them late by one unknown delay"
         )
 
@@ -263,4 +264,4 @@ def spread_stamps(time: FloatArray) -> tuple[FloatArray, str]:
     interval = np.minimum(share / sizes, np.maximum(3.0 * usual, step / sizes))
     within = np.arange(len(time)) - np.repeat(first, sizes)
     times = time + within * np.repeat(interval, sizes)
-    return times, f"samples of one stamp spread evenly, each time good to {step:.2g} s"
+    return times, f"samples of one stamp spread evenly, each time good to {short(step, 2)} s"

@@ -11,6 +11,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError, counted
+from fogml.numerals import short
 from fogml.runs.findings import DEAD, Finding, dead_words
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
@@ -123,7 +124,7 @@ def _gaps(run: Run) -> Iterator[Finding]:
         longest = int(np.argmax(lengths))
         gaps = counted(len(starts), "gap")
         message = (
-            f"{gaps} longer than 3 sample intervals, the longest {lengths[longest]:.4g} s at "
+            f"{gaps} longer than 3 sample intervals, the longest {short(lengths[longest], 4)} s at "
             f"{run.time[starts[longest] - 1]:.10g} s; the run is cut into {len(starts) + 1} stretches"
         )
         yield Finding("gap", message, column="time", row=int(starts[0]) + 1, count=len(starts))
@@ -142,7 +143,8 @@ def _irregular(run: Run) -> Iterator[Finding]:
         count += int(np.count_nonzero(off))
     if count > _IRREGULAR_SHARE * (len(run) - 1):
         message = (
-            f"{count} of {len(run) - 1} intervals differ from the median of {run.sample_s:.4g} s by more "
+            f"{count} of {len(run) - 1} intervals differ from the median of {short(run.sample_s, 4)} "
+            "s by more "
             "than a tenth; true times are used"
         )
         yield Finding("irregular_sampling", message, column="time", row=first, count=count)
@@ -297,7 +299,7 @@ def _outliers(run: Run) -> Iterator[Finding]:
         row = int(found[0])
         samples = counted(len(found), "sample")
         message = (
-            f"{samples} of 'gyro' over {OUTLIER_SIGMA:g} robust sigma ({sigma[0]:.4g}) off their "
+            f"{samples} of 'gyro' over {OUTLIER_SIGMA:g} robust sigma ({short(sigma[0], 4)}) off their "
             f"neighbours, the first {run.gyro[row]:.6g} at {run.time[row]:.10g} s; kept"
         )
         yield Finding("outliers", message, column="gyro", row=row + 1, count=len(found))
@@ -310,5 +312,5 @@ def _span(run: Run) -> Iterator[Finding]:
     least, most = large.extremes(temperature)
     span = most - least
     if span < SMALL_SPAN_DEGC:
-        message = f"the temperature spans {span:.3g} degC only; under 5 degC a drift model is poorly told"
+        message = f"the temperature spans {short(span)} degC only; under 5 degC a drift model is poorly told"
         yield Finding("small_temperature_span", message)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.numerals import short
 from fogml.pictures import BEFORE, OTHERS, Panel, Pictured, in_time
 from fogml.runs.columns import conversion, header, is_temperature, parse_header
 from fogml.runs.facts import Facts
@@ -89,7 +90,7 @@ class Exchange(Pictured):
         time = self.columns["time"]
         span = (time[-1] - time[0]) / 3600.0 if len(time) else 0.0
         facts = " ".join(filter(None, (self.facts.unit, self.facts.axis and f"axis {self.facts.axis}")))
-        return [self.name, f"{len(time)} samples, {span:.3g} h; {', '.join(self.columns)}", facts]
+        return [self.name, f"{len(time)} samples, {short(span)} h; {', '.join(self.columns)}", facts]
 
     def _panels(self) -> Sequence[Panel]:
         time = self.columns["time"]

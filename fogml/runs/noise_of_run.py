@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
+from fogml.numerals import short
 from fogml.runs.noise_series import (
     LOST,
     NoiseSeries,
@@ -202,7 +203,7 @@ def _warnings(
 ) -> list[dict[str, str]]:
     warnings: list[dict[str, str]] = []
     if moving:
-        spans = ", ".join(f"{name} by {span:.3g} degC" for name, span in moving.items())
+        spans = ", ".join(f"{name} by {short(span)} degC" for name, span in moving.items())
         message = (
             f"The temperature moves ({spans}): rate random walk K and rate ramp R can't be told from drift "
             "and are not given, and long averaging times hold the drift; give a run at constant temperature."
@@ -219,7 +220,7 @@ def _warnings(
         warnings.append({"code": "turning", "message": message})
     if _spread(run) > UNEVEN * run.sample_s:
         message = (
-            f"Samples are not evenly spaced: averaging times take them as {sample_s:.4g} s apart, as "
+            f"Samples are not evenly spaced: averaging times take them as {short(sample_s, 4)} s apart, as "
             "they are on average."
         )
         lost = 1.0 - (run.sample_s / sample_s) ** 0.5

@@ -10,6 +10,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.intervals import Z90
+from fogml.numerals import short
 from fogml.runs.noise_series import HOLD_ROWS, NoiseSeries
 from fogml.runs.run import Run
 from fogml.runs.steps import recorded_step
@@ -94,27 +95,29 @@ def words_of(terms: NoiseTerms, series: NoiseSeries, runs: Sequence[Run]) -> lis
     words = []
     if series.hold != 1.0:
         words.append(
-            f"Each value stands for {series.hold:.3g} samples: the log reads faster than the gyro gives new "
-            f"values, every {series.new_s:.3g} s. Terms are of the new values."
+            f"Each value stands for {short(series.hold)} samples: the log reads faster than the gyro "
+            "gives new "
+            f"values, every {short(series.new_s)} s. Terms are of the new values."
         )
     told = model_told(terms, np.array([series.sample_s]), series)["filter"]
     if told is not None and told["kind"] == "other":
         words.append(
-            f"Above {told['above_hz']:.3g} Hz the spectrum has a form of its own (a filter, a dither, a "
+            f"Above {short(told['above_hz'])} Hz the spectrum has a form of its own (a filter, a dither, a "
             f"resonance): it is left out, and the terms hold for averaging "
-            f"times from {terms.holds_from_s:.3g} s on."
+            f"times from {short(terms.holds_from_s)} s on."
         )
     elif told is not None:
-        corner = f" at {told['corner_hz']:.3g} Hz" if told["corner_hz"] else ""
+        corner = f" at {short(told['corner_hz'])} Hz" if told["corner_hz"] else ""
         words.append(
             f"The output is filtered ({told['words']}{corner}): terms are of the noise ahead of the "
             f"filter, and the Allan deviation "
-            f"shows them from {max(terms.holds_from_s, series.new_s):.3g} s on."
+            f"shows them from {short(max(terms.holds_from_s, series.new_s))} s on."
         )
     gaps = gaps_of(runs)
     if gaps["count"]:
         words.append(
-            f"{gaps['count']} gaps ({gaps['lost_s']:.4g} s lost): no average and no difference crosses one."
+            f"{gaps['count']} gaps ({short(gaps['lost_s'], 4)} s lost): no average and no difference "
+            "crosses one."
         )
     return words
 
@@ -128,9 +131,11 @@ def coarse_steps(series: NoiseSeries) -> list[dict[str, str]]:
         return []
     angle = step * series.new_s
     message = (
-        f"The output comes in steps of {step:.3g} deg/h ({angle:.3g} arcsec a sample), and its noise hardly "
+        f"The output comes in steps of {short(step)} deg/h ({short(angle)} arcsec a sample), and its "
+        "noise hardly "
         "moves it from one to the next: what rounding makes is then no white noise, and Q and N may be off "
-        f"by more than their intervals. Steps of an angle make a Q of {angle * _URAD / 12.0**0.5:.3g} urad; "
+        "by more than their intervals. Steps of an angle make a Q of "
+        f"{short(angle * _URAD / 12.0**0.5)} urad; "
         "record more slowly, or finer, for N."
     )
     return [{"code": "coarse_steps", "message": message}]
@@ -146,7 +151,8 @@ def rounded_log(series: NoiseSeries, terms: NoiseTerms) -> list[dict[str, str]]:
     if less < ROUNDED or share >= 1.0 or terms.terms["Q"].lower > 0.0:
         return []
     message = (
-        f"The output comes in steps of {step:.3g} deg/h: if the log rounds to them, and no angle is counted, "
+        f"The output comes in steps of {short(step)} deg/h: if the log rounds to them, and no angle "
+        "is counted, "
         f"N holds the rounding too, and that of the gyro itself is {less:.1%} less."
     )
     return [{"code": "rounded_log", "message": message}]
@@ -163,7 +169,8 @@ def doubts_of(
                 "code": "model_misfit",
                 "message": (
                     "The noise model does not describe this run: its spectrum is off by "
-                    f"{2.0 * terms.misfit:.1%} where chance explains less (p = {terms.fit_p_value:.1g}). "
+                    f"{2.0 * terms.misfit:.1%} where chance explains less (p = "
+                    f"{short(terms.fit_p_value, 1)}). "
                     "Intervals are widened by that; look at the plot for where."
                 ),
             }
@@ -174,8 +181,8 @@ def doubts_of(
             {
                 "code": "not_stationary",
                 "message": (
-                    f"The noise changes during the run: its size at {steady.tau_s:.3g} s in the three "
-                    f"thirds is {thirds} of the whole run's (p = {steady.p_value:.1g}). "
+                    f"The noise changes during the run: its size at {short(steady.tau_s)} s in the three "
+                    f"thirds is {thirds} of the whole run's (p = {short(steady.p_value, 1)}). "
                     "The terms are means over it."
                 ),
             }
@@ -188,13 +195,13 @@ def doubts_of(
             mean = np.average(logarithms, weights=errors**-2)
             p_value = float(chi2_sf(float(np.sum(((logarithms - mean) / errors) ** 2)), len(told) - 1))
             if p_value < DOUBT:
-                span = f"{np.exp(logarithms.min()):.3g} to {np.exp(logarithms.max()):.3g}"
+                span = f"{short(np.exp(logarithms.min()))} to {short(np.exp(logarithms.max()))}"
                 warnings.append(
                     {
                         "code": "replicates_differ",
                         "message": (
                             f"The runs do not share one N: alone they give {span} deg/sqrt(h) "
-                            f"(p = {p_value:.1g}). Look at each run's terms, not at the shared ones."
+                            f"(p = {short(p_value, 1)}). Look at each run's terms, not at the shared ones."
                         ),
                     }
                 )

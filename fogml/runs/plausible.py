@@ -13,6 +13,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.intervals import SIGMA_PER_MEDIAN
+from fogml.numerals import short
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
 from fogml.runs.turning import turning
@@ -138,14 +139,20 @@ def _unit_told(values: FloatArray) -> str | None:
     """What a temperature seems to be in, if not in degC."""
     least, most = large.extremes(values)
     if most < COLDEST_DEGC and least >= -COUNTS:
-        return f"reads {least:.4g} to {most:.4g}, colder than any chamber: degC under a header with [K]?"
+        return (
+            f"reads {short(least, 4)} to {short(most, 4)}, colder than any chamber: degC "
+            "under a header with [K]?"
+        )
     if least >= -COUNTS and most <= HOTTEST_DEGC:
         return None
     low, middle, high = large.quantiles(large.parts_of(values), [_ENDS[0], 0.5, _ENDS[1]])
     if KELVIN[0] <= low and high <= KELVIN[1] and middle > HOTTEST_DEGC:
-        return f"reads {low:.4g} to {high:.4g}: kelvin? Write the header with [K]"
+        return f"reads {short(low, 4)} to {short(high, 4)}: kelvin? Write the header with [K]"
     if low > COUNTS or high < -COUNTS:
-        return f"reads {low:.4g} to {high:.4g}: raw counts? State scale and offset in an import profile"
+        return (
+            f"reads {short(low, 4)} to {short(high, 4)}: raw counts? State scale and offset "
+            "in an import profile"
+        )
     return None
 
 
@@ -168,7 +175,8 @@ def _thermometers(run: Run, names: Sequence[str]) -> Iterator[Finding]:
     a, b = max(pairs, key=lambda pair: means[pair[1]] - means[pair[0]], default=(None, None))
     if a is not None and b is not None and a not in odd and b not in odd and means[b] - means[a] > APART_DEGC:
         why = (
-            f"'{a}' and '{b}' differ by {means[b] - means[a]:.4g} degC ({means[a]:.4g} and {means[b]:.4g}): "
+            f"'{a}' and '{b}' differ by {short(means[b] - means[a], 4)} degC ({short(means[a], 4)} "
+            f"and {short(means[b], 4)}): "
             "is one of them in another unit, or dead?"
         )
         yield Finding("thermometers_apart", why, column=a, count=len(run))
@@ -183,7 +191,8 @@ def _hot(run: Run, names: Sequence[str]) -> Iterator[Finding]:
         low, high = large.quantiles(large.parts_of(run.columns[name]), _ENDS)
         if high > hot:
             message = (
-                f"'{name}' reads {low:.4g} to {high:.4g} degC, hotter than fibre gyros are built for: "
+                f"'{name}' reads {short(low, 4)} to {short(high, 4)} degC, hotter than fibre gyros "
+                "are built for: "
                 "Fahrenheit? Write its header with [degF]; if it was so hot, nothing is to be done"
             )
             yield Finding("implausible_temperature", message, column=name, count=len(run))
@@ -195,8 +204,8 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
     if SPREADSHEET_DAYS[0] <= time[0] and time[-1] <= SPREADSHEET_DAYS[1] and run.sample_s < 60.0 / DAY_S:
         told = (
             f"the times, {time[0]:.10g} to {time[-1]:.10g} s, are days as a spreadsheet counts them, "
-            f"one sample in {DAY_S * run.sample_s:.3g} s: write the header as 'time [d]'; if samples are "
-            f"{run.sample_s:.3g} s apart, nothing is to be done"
+            f"one sample in {short(DAY_S * run.sample_s)} s: write the header as 'time [d]'; if samples are "
+            f"{short(run.sample_s)} s apart, nothing is to be done"
         )
         yield Finding("implausible_clock", told, column="time", count=len(run))
         return
@@ -209,7 +218,8 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
         fast = moved > FASTEST_DEGC_PER_MIN / 60.0 * within_s
         if moved[fast].sum() >= FAR_DEGC:
             told = (
-                f"'{name}' moves by {moved[fast].sum():.3g} degC in {within_s[fast].sum():.3g} s in all, "
+                f"'{name}' moves by {short(moved[fast].sum())} degC in {short(within_s[fast].sum())} "
+                "s in all, "
                 "faster than a chamber takes a gyro: is the clock in minutes, hours or days? Write "
                 "its header as 'time [min]', 'time [h]' or 'time [d]'"
             )
@@ -288,5 +298,5 @@ def _earth_rate(run: Run, gyro: FloatArray) -> Iterator[Finding]:
                 why = f"{unit}{turned}? Correct the column's unit"
     if why is None:
         return
-    told = f"the output at rest is {mean:.4g} deg/h where Earth rate is {earth:.4g} deg/h: {why}"
+    told = f"the output at rest is {short(mean, 4)} deg/h where Earth rate is {short(earth, 4)} deg/h: {why}"
     yield Finding("implausible_earth_rate", told, column="gyro", count=len(at_rest))

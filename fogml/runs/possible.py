@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
+from fogml.numerals import short
 from fogml.runs.clock_order import Ordered
 from fogml.runs.columns import column_spec
 from fogml.runs.findings import Finding
@@ -40,7 +41,7 @@ def fault_of(value: float) -> str:
     """What is wrong with a value."""
     if np.isnan(value):
         return "missing (NaN)"
-    return "infinite" if np.isinf(value) else f"{value:.3g}, which no sensor gives"
+    return "infinite" if np.isinf(value) else f"{short(value)}, which no sensor gives"
 
 
 def clock_fault(time: FloatArray) -> str | None:
@@ -49,10 +50,10 @@ def clock_fault(time: FloatArray) -> str | None:
         return None
     if max(abs(time[0]), abs(time[-1])) > GREATEST_TIME_S:
         most = max(time[0], time[-1], key=abs)
-        return f"times up to {most:.3g} s are no clock's; state its unit, e.g. 'time [us]'"
+        return f"times up to {short(most)} s are no clock's; state its unit, e.g. 'time [us]'"
     step = float(time[-1] - time[0]) / (len(time) - 1)
     if step < SHORTEST_STEP_S:
-        return f"samples {step:.3g} s apart are no gyro's; state the clock's unit, e.g. 'time [s]'"
+        return f"samples {short(step)} s apart are no gyro's; state the clock's unit, e.g. 'time [s]'"
     if digits_of_clock(time):
         return (
             f"times such as {np.floor(time[-1]):06.0f} are hours, minutes and seconds in digits, as they jump"
@@ -102,7 +103,8 @@ def float32_reason(time: FloatArray) -> str | None:
     if np.any(time.astype(np.float32).astype(np.float64) != time):
         return None
     return (
-        f"the times are in single precision (float32), whose numbers near {greatest:.4g} are {apart:.3g} s "
+        f"the times are in single precision (float32), whose numbers near {short(greatest, 4)} are "
+        f"{short(apart)} s "
         "apart; take the start off in double precision before they are stored"
     )
 

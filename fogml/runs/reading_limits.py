@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fogml.errors import InputError
+from fogml.numerals import short
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class ReadingLimits:
         """Refuse a file that states more values of 8 bytes than it can hold."""
         if 8.0 * values > self.unpacked(path):
             raise InputError(
-                f"{path.name}: damaged: it states {values:.3g} values, more than a file of its size can "
+                f"{path.name}: damaged: it states {short(values)} values, more than a file of its size can "
                 "hold; copy or export it again"
             )
 

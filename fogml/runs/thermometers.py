@@ -8,6 +8,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import counted
+from fogml.numerals import short
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.run import Run
@@ -44,7 +45,7 @@ def spiked(run: Run) -> Iterator[Finding]:
             readings = counted(count, "reading")
             message = (
                 f"{readings} of '{name}' over {OUTLIER_SIGMA:g} robust sigma off their neighbours, by up to "
-                f"{off.max():.3g} degC, the first {values[row]:.6g} at {run.time[row]:.10g} s; kept: they "
+                f"{short(off.max())} degC, the first {values[row]:.6g} at {run.time[row]:.10g} s; kept: they "
                 "count as temperature and as its rate"
             )
             yield Finding("temperature_outliers", message, column=name, row=row + 1, count=count)
@@ -78,8 +79,9 @@ def coarse(run: Run) -> Iterator[Finding]:
         if error < SLOW_RATE_DEGC_MIN or not _in_steps(values, step):
             continue
         message = (
-            f"'{name}' is recorded in steps of {step:.3g} degC: a rate of temperature over "
-            f"{RATE_WINDOW_S:g} s is off by {error:.2g} degC/min (one sigma), and its coefficient by more "
+            f"'{name}' is recorded in steps of {short(step)} degC: a rate of temperature over "
+            f"{RATE_WINDOW_S:g} s is off by {short(error, 2)} degC/min (one sigma), and its "
+            "coefficient by more "
             f"than is stated; record more digits, or take longer windows: dT[block, {_long_enough(step):g} s]"
         )
         yield Finding("coarse_thermometer", message, column=name, count=len(values))

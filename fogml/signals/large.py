@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
+from fogml.numerals import short
 
 HELD_VALUES = 1 << 20
 """Values up to which an array is kept in memory: 8 MiB of float64, of which a command holds some dozens."""
@@ -66,7 +67,7 @@ def _reserve(file: Any, size: int) -> None:
 def no_room(size: int, error: OSError) -> InputError:
     """What to say where temporary files find no room for so many bytes."""
     return InputError(
-        f"{tempfile.gettempdir()}: no room for {size / 1e9:.2g} GB of a long run "
+        f"{tempfile.gettempdir()}: no room for {short(size / 1e9, 2)} GB of a long run "
         f"({error.strerror or error}); free some, or let the environment variable TMPDIR name a folder of a "
         "larger drive"
     )

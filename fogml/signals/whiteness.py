@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
+from fogml.numerals import short
 from fogml.signals import large
 from fogml.signals.distributions import chi2_cdf, chi2_sf, variances_sf
 
@@ -113,7 +114,7 @@ def whiteness(
     overall = float(min(1.0, len(p_values) * p_values.min()))
     threshold = level / len(p_values)
     failed = [
-        f"the variance of means over {scale * sample_s:g} s is {ratio:.3g} times what the model expects"
+        f"the variance of means over {scale * sample_s:g} s is {short(ratio)} times what the model expects"
         for scale, ratio, p in zip(scales, ratios, scale_p)
         if p < threshold
     ]

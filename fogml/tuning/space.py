@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import FiniteFloat, field_validator, model_validator
 
 from fogml.errors import InputError
+from fogml.numerals import short
 from fogml.strict import Strict
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ class Space(Strict):
 
 def window_text(seconds: float) -> str:
     """A window's length to three significant digits, as feature text takes it."""
-    return f"{float(f'{seconds:.3g}'):g}"
+    return f"{float(f'{short(seconds)}'):g}"
 
 
 def _of(trial: optuna.Trial, name: str, choices: list[str]) -> str:

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError, did_you_mean, known_are, quoted
+from fogml.numerals import number_text
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.schedule import Schedule, schedule
 from fogml.twin.sentences import parse_action, parse_quantity, parse_step
-from fogml.twin.steps import Action, Repeat, Step, number_text
+from fogml.twin.steps import Action, Repeat, Step
 from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.programme/1"

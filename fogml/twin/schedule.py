@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from fogml.errors import InputError
+from fogml.numerals import number_text
 from fogml.twin.steps import (
     SWITCHED,
     Action,
@@ -21,7 +22,6 @@ from fogml.twin.steps import (
     Turn,
     TurnTo,
     duration_text,
-    number_text,
 )
 from fogml.twin.table import Table, Wave
 

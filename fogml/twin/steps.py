@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from fogml.errors import InputError
+from fogml.numerals import number_text
 
 Switched = Literal["power", "fan", "compressor", "heater", "humidity", "radiation", "yaw"]
 SWITCHED: tuple[Switched, ...] = get_args(Switched)
@@ -22,12 +23,6 @@ _CYCLE_SLACK = 1e-6
 _COLDEST, _HOTTEST = -100.0, 150.0
 AUTOMATIC: tuple[Switched, ...] = ("compressor", "heater", "humidity")
 """What the chamber sees to by itself unless told otherwise."""
-
-
-def number_text(value: float) -> str:
-    """A number without a needless ``.0``, exact on reading back."""
-    text = repr(float(value))
-    return text[:-2] if text.endswith(".0") else text
 
 
 def duration_text(seconds: float) -> str:

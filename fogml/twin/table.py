@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from fogml.errors import InputError
+from fogml.numerals import short
 
 _SLACK_S = 1e-6
 
@@ -54,7 +55,7 @@ class Table:
         needed = abs(rate - self._rate(start)) / self._acceleration
         if needed > stop - start:
             raise InputError(
-                f"{owner}: at {self._acceleration:g} deg/s2 the table needs {needed:.3g} s to reach "
+                f"{owner}: at {self._acceleration:g} deg/s2 the table needs {short(needed)} s to reach "
                 f"{rate:g} deg/s; turn for longer, or state a higher 'table_acceleration'"
             )
         self._go_to(start, rate)
@@ -101,7 +102,7 @@ class Table:
         needed = 2.0 * math.pi * wave.frequency * wave.rate
         if needed > self._acceleration:
             raise InputError(
-                f"{owner}: the table would have to reach {needed:.3g} deg/s2 and has "
+                f"{owner}: the table would have to reach {short(needed)} deg/s2 and has "
                 f"{self._acceleration:g} deg/s2; state a higher 'table_acceleration'"
             )
         self.waves.append(wave)

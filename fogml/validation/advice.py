@@ -10,6 +10,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.intervals import LEVEL
 from fogml.models.box import LEAST_SPAN_DEGC, ways_moved
+from fogml.numerals import short
 from fogml.validation.reasons import (
     Grade,
     Reason,
@@ -88,8 +89,8 @@ def advice_on(judgement: Judgement, asked: Asked | None = None) -> Advice:
     if not found:
         worst = max(judgement.test, key=lambda run: run.after.rms)
         told = (
-            f"On {worst.run}, which it has not seen, it leaves {worst.after.rms:.3g} of "
-            f"{worst.before.rms:.3g} deg/h rms; nothing that training or judging knows speaks against it."
+            f"On {worst.run}, which it has not seen, it leaves {short(worst.after.rms)} of "
+            f"{short(worst.before.rms)} deg/h rms; nothing that training or judging knows speaks against it."
         )
         return Advice(
             "use",
@@ -113,7 +114,7 @@ def which_to_use(judgement: Judgement, asked: Asked | None = None) -> tuple[str 
         return None, ""
     best = min(left, key=lambda name: left[name])
     kind = judgement.model["kind"]
-    told = f"{best} leaves {left[best]:.3g} deg/h rms on its worst test run, {kind} {own:.3g}"
+    told = f"{best} leaves {short(left[best])} deg/h rms on its worst test run, {kind} {short(own)}"
     if left[best] < (1.0 - margin) * own:
         return best, f"Use {best}: {told}."
     if own < (1.0 - margin) * left[best]:
@@ -211,7 +212,7 @@ def _limits(judgement: Judgement) -> Iterator[Reason]:
             yield Reason(
                 "do_not_use",
                 f"{name} over its limit",
-                f"{name.capitalize()} is {outcome.value:.3g}, the limit {outcome.limit:g}.",
+                f"{name.capitalize()} is {short(outcome.value)}, the limit {outcome.limit:g}.",
                 "See which regime the rest comes from, train on more runs, or compare other models.",
             )
 
@@ -223,8 +224,8 @@ def _one_temperature(judgement: Judgement) -> Iterator[Reason]:
         yield Reason(
             "do_not_use" if used and _span(used) >= LEAST_SPAN_DEGC else "use_with_care",
             "trained at one temperature",
-            f"Temperature spans {_span(held):.2g} degC in training: what is compensated holds at "
-            f"{float(np.mean(held[0])):.3g} degC alone.",
+            f"Temperature spans {short(_span(held), 2)} degC in training: what is compensated holds at "
+            f"{short(float(np.mean(held[0])))} degC alone.",
             "Train on a ramp up and a ramp down over the range of use.",
         )
 

@@ -10,6 +10,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
+from fogml.numerals import short
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.noise_series import rows_at_rest, sample_interval
 from fogml.runs.run import Run
@@ -176,6 +177,8 @@ def out_of_reach(
     if index >= low:
         return None
     return (
-        f"No model can reach the design index of {index:g} deg/h: the noise alone leaves {floor:.3g} deg/h "
-        f"rms ({low:.3g} to {high:.3g}, {LEVEL:.0%}) in {count} averages over {averaging_s:g} s of {where}"
+        f"No model can reach the design index of {index:g} deg/h: the noise alone leaves "
+        f"{short(floor)} deg/h "
+        f"rms ({short(low)} to {short(high)}, {LEVEL:.0%}) in {count} averages over {averaging_s:g} "
+        f"s of {where}"
     )

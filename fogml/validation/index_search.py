@@ -19,6 +19,7 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import FogmlError, InputError, counted
 from fogml.models.card import runs_of
 from fogml.models.table import usable_rows
+from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S, block_averages
 from fogml.validation.floors import floor_of_run, out_of_reach
@@ -110,7 +111,8 @@ class IndexSearch:
         tries = counted(len(self.trials), "try", "tries")
         return (
             f"Searched on folds of the training runs in {tries}: {outcome} "
-            f"({self.chosen.rms:.4g} deg/h against {self.design_index:g}). The test runs were judged once."
+            f"({short(self.chosen.rms, 4)} deg/h against {self.design_index:g}). The test runs were "
+            "judged once."
         )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from fogml.numerals import short
 from fogml.runs.findings import IMPLAUSIBLE
 from fogml.validation.floors import floor_interval
 from fogml.validation.results import RunJudgement
@@ -70,8 +71,10 @@ def unit_reasons(train: Sequence[RunJudgement], test: Sequence[RunJudgement]) ->
                 yield Reason(
                     "do_not_use",
                     f"{run.run} and {other.run} seem to be in different units",
-                    f"{run.run} moves by {moves[0]:.3g} deg/h and {other.run} by {moves[1]:.3g}, and their "
-                    f"noise is as far apart ({noises[0]:.2g} and {noises[1]:.2g}): is one of them in deg/s, "
+                    f"{run.run} moves by {short(moves[0])} deg/h and {other.run} by "
+                    f"{short(moves[1])}, and their "
+                    f"noise is as far apart ({short(noises[0], 2)} and {short(noises[1], 2)}): is "
+                    "one of them in deg/s, "
                     "3600 times deg/h?",
                     "Put the unit of the output right, and train and judge again.",
                 )
@@ -89,20 +92,22 @@ def gained_reasons(run: RunJudgement) -> Iterator[Reason]:
     # By squares, as drift and noise add up: where noise is half of it, drift that is gone hardly shows.
     pairs = ((before, after), (run.before.bias_stability, run.after.bias_stability))
     taken = math.sqrt(max(0.0, *(a**2 - b**2 for a, b in pairs)))
-    within = f"{run.before.bias_stability:.3g} deg/h of bias stability become {run.after.bias_stability:.3g}"
+    within = (
+        f"{short(run.before.bias_stability)} deg/h of bias stability become {short(run.after.bias_stability)}"
+    )
     if gained < 0.0 and after > noise and steadier >= run.floor:
         yield Reason(
             "use_with_care",
             f"the mean of {run.run} moved",
-            f"Within {run.run} {within}, but its mean lies {run.after.bias:.3g} deg/h off, "
-            f"{run.before.bias:.3g} without the model: that power-on shifted it, or the model did.",
+            f"Within {run.run} {within}, but its mean lies {short(run.after.bias)} deg/h off, "
+            f"{short(run.before.bias)} without the model: that power-on shifted it, or the model did.",
             "Judge it on more runs: their means tell which, and how repeatable the bias is.",
         )
     elif gained < 0.0 and after > noise:
         yield Reason(
             "do_not_use",
             f"worse than none on {run.run}",
-            f"It makes {run.run} worse: {after:.3g} deg/h rms after, {before:.3g} before.",
+            f"It makes {run.run} worse: {short(after)} deg/h rms after, {short(before)} before.",
             "Train on runs that are like the ones it is used on, or leave the output as it is.",
         )
     elif taken < run.floor:
@@ -110,16 +115,18 @@ def gained_reasons(run: RunJudgement) -> Iterator[Reason]:
         yield Reason(
             "use_with_care" if only_noise else "do_not_use",
             f"takes away less than the noise on {run.run}",
-            f"On {run.run} {before:.3g} deg/h rms become {after:.3g}: {taken:.3g} is taken away, less than "
-            f"the noise floor of {run.floor:.3g}{', and only noise is left' if only_noise else ''}.",
+            f"On {run.run} {short(before)} deg/h rms become {short(after)}: {short(taken)} is taken "
+            "away, less than "
+            f"the noise floor of {short(run.floor)}{', and only noise is left' if only_noise else ''}.",
             "Leave the output as it is." if only_noise else "Compare other models (fogml compare).",
         )
     elif max(gained, steadier) < run.floor and after > noise:
         yield Reason(
             "use_with_care",
             f"leaves most of it on {run.run}",
-            f"On {run.run} {before:.3g} deg/h rms become {after:.3g}: less is gained than the noise floor of "
-            f"{run.floor:.3g}, and more is left.",
+            f"On {run.run} {short(before)} deg/h rms become {short(after)}: less is gained than the "
+            "noise floor of "
+            f"{short(run.floor)}, and more is left.",
             "Compare other models (fogml compare).",
         )
     elif steadier < -run.floor:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray
+from fogml.numerals import short
 from fogml.pictures import AFTER, BEFORE, Panel, Pictured, in_time
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding, standstill
@@ -190,7 +191,8 @@ class Judgement(Pictured):
 
     def _heading(self) -> Sequence[str]:
         lines = [
-            f"{run.run}: rms {run.before.rms:.3g} → {run.after.rms:.3g} deg/h, noise floor {run.floor:.3g}"
+            f"{run.run}: rms {short(run.before.rms)} → {short(run.after.rms)} deg/h, noise floor "
+            f"{short(run.floor)}"
             for run in self.test
         ]
         return [f"{self.model['kind']}, judged", *lines]

@@ -9,6 +9,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.models.generalised_least_squares import beside_constants, runs_noise
 from fogml.models.table import RunRows, averaged_table
+from fogml.numerals import short
 from fogml.runs.run import Run
 
 
@@ -56,7 +57,7 @@ def settling_warning(
     if not abs(amplitude) > shows * error:
         return None
     message = (
-        f"The output settles at the begin, by {abs(amplitude):.2g} deg/h with a time constant near "
+        f"The output settles at the begin, by {short(abs(amplitude), 2)} deg/h with a time constant near "
         f"{taus[best]:.0f} s: K, R and what long averaging times hold are of that too; leave out the first "
         f"{5.0 * taus[best]:.0f} s for the noise of the settled gyro."
     )

@@ -22,6 +22,7 @@ from fogml.gap.result_parts import Rehearsed
 from fogml.gap.rows import Rows
 from fogml.gap.search import Search
 from fogml.gap.shapes import usual_shapes
+from fogml.numerals import short
 from fogml.signals.bases import corners
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.programme import Programme, programme_from
@@ -89,7 +90,7 @@ def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
         "steps": [f"{soak} {REPEAT.off_h:g} h", {f"{soak} {hours:g} h": ["power on"]}, *course_again],
     }
     if fastest > Programme.fastest_rate:
-        values["fastest_rate"] = f"{fastest:.3g} degC/min"
+        values["fastest_rate"] = f"{short(fastest)} degC/min"
     programme = programme_from(values, "repeat-run")
     total = REPEAT.off_h + hours + float(rows.run.span_s) / 3600.0
     told = (f"{soak} {REPEAT.off_h:g} h, power off", f"{soak} {hours:g} h, power on", *course_again)
@@ -130,7 +131,7 @@ def _steps_again(rows: Rows) -> tuple[list[str], float]:
             continue
         if soaked:
             said.append(f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min")
-        speed = float(f"{abs(to - at) / minutes:.3g}")
+        speed = float(f"{short(abs(to - at) / minutes)}")
         fastest = max(fastest, speed)
         said.append(f"ramp to {to:g} degC at {speed:g} degC/min")
         at, soaked = to, 0.0

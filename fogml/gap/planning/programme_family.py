@@ -26,6 +26,7 @@ from fogml.gap.planning.programme_design import (
     leg,
     soak,
 )
+from fogml.numerals import short
 from fogml.twin.programme import Programme
 from fogml.twin.steps import Ramp, Step, duration_text
 
@@ -67,7 +68,7 @@ class Family:
         if not least <= self.hours <= 1000.0:
             raise InputError(
                 f"{self.hours:g} h: the shortest programme between {low:g} and {high:g} degC takes "
-                f"{least:.3g} h; give that or more, up to 1000 h"
+                f"{short(least)} h; give that or more, up to 1000 h"
             )
 
     def shortest(self) -> Design:
