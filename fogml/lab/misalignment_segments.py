@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +112,8 @@ def from_rates(rows: Rows) -> TableMeasurements:
 def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
     """Measurements of samples: rests and turns found, changes of the rate cut, turns cut to whole ones.
 
-    Over whole turns the horizontal part of the Earth rate averages to nothing.
+    The horizontal part of the Earth rate, which goes once about in a turn, is taken off: over whole turns it
+    averages to nothing only where no row is lost.
 
     Raises
     ------
@@ -143,9 +144,12 @@ def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
     edges = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(time)]])
     first, last = edges[:-1][kept[edges[:-1]]], edges[1:][kept[edges[:-1]]]
     sample_s = run.sample_s
-    ends = np.array([_whole_turns(run, a, b, sample_s) for a, b in zip(first, last)], dtype=np.intp)
+    level, ends = rows.output.copy(), last.copy()
+    for place, start in enumerate(first.tolist()):
+        ends[place], turning_part = _whole_turns(run, start, int(last[place]), sample_s)
+        level[start : ends[place]] -= turning_part
     try:
-        return _measured(rows, _chunks(rows, (first, ends), rest))
+        return _measured(rows, _chunks(replace(rows, output=level), (first, ends), rest))
     except InputError:
         _check_left(rows, run, kept, rest)
         raise
@@ -167,13 +171,23 @@ def _check_left(rows: Rows, run: Run, kept: BoolArray, rest: BoolArray) -> None:
         )
 
 
-def _whole_turns(run: Run, first: int, last: int, sample_s: float) -> int:
-    """End of the rows that make up whole turns of the table; all of a rest, and of less than one turn."""
-    rate = abs(float(np.mean(run.rate[first:last])))
-    if rate < LEAST_RATE_DEG_S or sample_s <= 0.0:
-        return last
-    turns = np.floor((last - first) * sample_s * rate / 360.0 + 1e-6)
-    return min(first + round(float(turns) * 360.0 / rate / sample_s), last) if turns >= 1.0 else last
+def _whole_turns(run: Run, first: int, last: int, sample_s: float) -> tuple[int, FloatArray | float]:
+    """End of the rows that make up whole turns of the table, and what in them goes once about in a turn.
+
+    Of a rest, and of less than one turn, all rows and nothing.
+    """
+    rate, time = float(np.mean(run.rate[first:last])), run.time[first:last] - run.time[first]
+    if abs(rate) < LEAST_RATE_DEG_S or sample_s <= 0.0:
+        return last, 0.0
+    turns = np.floor((time[-1] + sample_s) * abs(rate) / 360.0 + 1e-6)
+    if turns < 1.0:
+        return last, 0.0
+    end = first + int(np.searchsorted(time, turns * 360.0 / abs(rate) - 0.5 * sample_s))
+    angle = np.radians(rate * time[: end - first])
+    columns = np.column_stack([np.cos(angle), np.sin(angle)])
+    output = run.gyro[first:end] - run.gyro[first:end].mean()
+    sizes = np.linalg.lstsq(columns - columns.mean(axis=0), output, rcond=1e-6)[0]
+    return end, np.asarray(columns @ sizes)
 
 
 def _edges(rows: Rows, changes: BoolArray) -> tuple[IndexArray, IndexArray]:
