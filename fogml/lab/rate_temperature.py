@@ -11,7 +11,7 @@ from fogml.arrays import FloatArray
 from fogml.lab.rate_errors import spread_of
 from fogml.lab.rate_pieces import Plateaus
 from fogml.runs.run import Run
-from fogml.validation.scale_factor import find_steps
+from fogml.validation.scale_factor import SAME_SHARE, find_steps
 
 LEAST_SPAN_DEGC = 5.0
 """Temperatures closer together tell no sensitivity."""
@@ -135,16 +135,23 @@ class _Soaks:
 
 
 def _soaks(steps: FloatArray) -> _Soaks:
-    """Scale factor of the steps of each temperature."""
+    """Scale factor of the steps of each temperature.
+
+    Soaks that turned both ways tell it apart from an asymmetry, and where they are apart in temperature they
+    alone count; otherwise it is that of the sense turned.
+    """
     steps = steps[np.argsort(steps[:, 0])]
-    edges = np.flatnonzero(np.diff(steps[:, 0]) > SAME_DEGC) + 1
+    groups = np.split(steps, np.flatnonzero(np.diff(steps[:, 0]) > SAME_DEGC) + 1)
+    # Of a rate that was measured, the two columns are alike but for what it is off.
+    both = [g for g in groups if np.linalg.matrix_rank(g[:, 1:3], SAME_SHARE * np.linalg.norm(g[:, 1:3])) > 1]
+    columns = slice(1, 3) if both and _apart(np.concatenate(both)) else slice(1, 2)
     told, squares, freedom = [], 0.0, 0
-    for group in np.split(steps, edges):
-        inverse = np.linalg.pinv(group[:, 1:3])
+    for group in both if columns.stop == 3 else groups:
+        inverse = np.linalg.pinv(group[:, columns])
         solved = inverse @ group[:, 3]
-        left = group[:, 3] - group[:, 1:3] @ solved
+        left = group[:, 3] - group[:, columns] @ solved
         squares += float(left @ left)
-        freedom += len(group) - int(np.linalg.matrix_rank(group[:, 1:3]))
+        freedom += len(group) - len(solved)
         told.append((float(group[:, 0].mean()), float(solved[0]), float(inverse[0] @ inverse[0])))
     temperature, scale, variance = np.array(told).T
     return _Soaks(temperature, scale, variance, squares, freedom)

@@ -109,6 +109,20 @@ def test_soaks_of_three_temperatures_have_an_interval_of_few_degrees_of_freedom(
     assert np.mean(held) >= 0.8
 
 
+@pytest.mark.parametrize("one_way", [[0, 1, 2], [1]])
+def test_soaks_that_turned_one_way_are_no_half_of_a_scale_factor(one_way: list[int]) -> None:
+    rng = np.random.default_rng(4)
+    ladder = [[0.0, 10.0, 0.0] if soak in one_way else [0.0, 10.0, -10.0, 0.0] for soak in range(3)]
+    rate = np.repeat(np.concatenate(ladder), 60)
+    warmth = np.repeat([-40.0, 10.0, 60.0], [60 * len(rates) for rates in ladder])
+    gyro = 3600.0 * rate * SCALE * (1.0 + 2e-6 * (warmth - 10.0)) + 0.01 * rng.standard_normal(len(rate))
+    rate = rate + 1e-4 * rng.standard_normal(len(rate))
+    columns: dict[str, Any] = {"time": np.arange(len(rate)) * 1.0, "gyro": gyro, "rate": rate, "T": warmth}
+    sensed = rate_json([Run("soaks", columns, Facts())], source="table")["temperature_sensitivity"]
+    assert sensed["ppm_per_degC"] == pytest.approx(2.0, abs=0.1)
+    np.testing.assert_allclose(sensed["scale_factor"], SCALE, rtol=2e-4)
+
+
 def test_one_known_part_gives_student_s_interval() -> None:
     rng = np.random.default_rng(0)
     line = np.column_stack([np.ones(200), np.arange(200.0)])
