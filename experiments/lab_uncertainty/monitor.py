@@ -21,7 +21,8 @@ class Months:
 
     Deviations between runs: white, flicker, a walk, a season (amplitude, 52 runs a year), and the tails of a
     Student's t with `freedom`, 0 for normal ones; each run tells its figure with an error of the deviation
-    `error`, stated right. The change is a step or, per run, a ramp, of the given size either way.
+    `error`, stated right. So many `figures` are watched. The change is a step or, per run, a ramp, of the
+    given size either way.
     """
 
     white: float = 1.0
@@ -33,12 +34,14 @@ class Months:
     shape: str = ""
     size: float = 0.0
     onset: int = 20
+    figures: int = 1
 
 
 CASES = {
     "nothing changes, white": Months(),
     "nothing changes, flicker": Months(flicker=1.0),
     "nothing changes, tails": Months(freedom=3),
+    "nothing changes, tails of all four figures": Months(freedom=3, error=0.2, figures=4),
     "nothing changes, random walk": Months(walk=0.1),
     "nothing changes, season of amplitude 1": Months(season=1.0),
     "nothing changes, season of amplitude 3": Months(season=3.0),
@@ -73,9 +76,11 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
     months, false, onset = CASES[name], 0, []
     sizes: list[Told | None] = []
     for repeat in range(repeats):
-        level, errors, size = recorded(months, np.random.default_rng([seed, repeat]))
-        age = np.arange(float(RUNS))
-        chart = change_chart({"level": level}, age, LIMIT, errors={"level": errors})
+        rng = np.random.default_rng([seed, repeat])
+        drawn = [recorded(months, rng) for _ in range(months.figures)]
+        levels = {str(number): level for number, (level, _, _) in enumerate(drawn)}
+        errors = {str(number): error for number, (_, error, _) in enumerate(drawn)}
+        chart, size = change_chart(levels, np.arange(float(RUNS)), LIMIT, errors=errors), drawn[0][2]
         if not months.shape:
             false += bool(chart.changes)
             continue

@@ -41,6 +41,9 @@ class ChangePrior:
         Variances that flicker between runs may have per factor e of time, in the variance of the first runs.
     longest_wander
         Slowest flicker, in mean intervals between the baseline's runs.
+    confirming_runs
+        Runs that have to show a change, the one it begins with among them: one alone may be an outlier, of
+        which the normal distribution knows nothing.
     """
 
     baseline_runs: int = 3
@@ -49,6 +52,7 @@ class ChangePrior:
     between: tuple[float, ...] = (0.0, 0.1, 0.5, 0.9, 1.0)
     wander: tuple[float, ...] = (0.0, 1 / 16, 1 / 4, 1.0)
     longest_wander: float = 1000.0
+    confirming_runs: int = 2
 
     def steady(self) -> ChangePrior:
         """The same where figures are known not to wander between runs."""
@@ -88,7 +92,8 @@ class FigureEvidence:
     Attributes
     ----------
     logs
-        Log evidence by onset (each told run after the baseline) and shape, shape (m, 2); (0, 2) before.
+        Log evidence by onset (each told run after the baseline that enough have followed) and shape, shape
+        (m, 2); (0, 2) before.
     """
 
     def __init__(
@@ -99,6 +104,7 @@ class FigureEvidence:
             told &= np.isfinite(errors[first:])
         self._rows = first + np.flatnonzero(told)
         self._baseline = prior.baseline_runs
+        self._unconfirmed = prior.confirming_runs - 1
         self._done = 0
         self.logs: FloatArray = np.empty((0, len(SHAPES)))
         n = len(self._rows)
@@ -197,9 +203,9 @@ class FigureEvidence:
     def go_to(self, place: int) -> None:
         """Take the runs up to and with index `place`."""
         self._done = int(np.searchsorted(self._rows, place, side="right"))
-        if self._done > self._baseline:
-            told = self._all[self._done - 1, : len(SHAPES) * (self._done - self._baseline)]
-            self.logs = told.reshape(-1, len(SHAPES))
+        onsets = self._done - self._baseline - self._unconfirmed
+        if onsets > 0:
+            self.logs = self._all[self._done - 1, : len(SHAPES) * onsets].reshape(-1, len(SHAPES))
 
     def onset(self, change: int) -> int:
         """Index of the run that a change begins with."""
