@@ -195,10 +195,10 @@ def page(values: Mapping[str, Any]) -> str:
             "",
             f"Synthetic cases at 10 s, method {values['method']}, seed {values['seed']}, which is {kept}. "
             f"Cases: {counted}. Each figure with its 95 % interval "
-            "(Wilson's for shares) and what it rests on; wanted figures ask for 400 cases each, and none "
-            "rests on as many here. Forms of the first reality lie near the catalogue's, those of the others "
-            "were drawn without asking how near. A far form that is called by its name is right; called "
-            "unknown it is a miss.",
+            "(Wilson's for shares) and how many cases, names or runs it rests on; wanted figures ask for 400 "
+            "cases each. Forms of the first reality lie near the catalogue's, those of the others were drawn "
+            "without asking how near. A far form that is called by its name is right; called unknown it is a "
+            "miss.",
             "",
             f"| figure | wanted | {' | '.join(names)} |",
             f"|---|---:|{'---:|' * len(names)}",
