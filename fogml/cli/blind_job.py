@@ -251,6 +251,6 @@ def _print(values: dict[str, Any], method: str, terminal: Terminal) -> None:
     terminal.table(title, ["figure", "reached", "wanted", "n"], rows)
     for one in values["gates"]:
         bound = "at least" if one["at_least"] else "at most"
-        value = "no value" if one["value"] is None else f"{short(one['value'], 4)}"
+        value = "no value" if one["value"] is None else short(one["value"], 4)
         outcome = "met" if one["met"] else "NOT met"
         terminal.say(f"gate {one['key']}: {value}, {bound} {one['limit']:g}: {outcome}")

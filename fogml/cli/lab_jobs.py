@@ -78,7 +78,7 @@ def _figures(value: float, error: float | None, ends: list[float] | None) -> lis
 
     places = max(-math.floor(math.log10(error)), 0) if error else 0
     shown = [told(end) for end in ends] if ends else ["–", "–"]
-    return [told(value), "–" if error is None else f"{short(error, 2)}", *shown]
+    return [told(value), "–" if error is None else short(error, 2), *shown]
 
 
 def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:

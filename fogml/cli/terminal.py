@@ -269,4 +269,4 @@ def number(value: float | None) -> str:
     """
     if value is None:
         return "–"
-    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{short(value, 4)}"
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else short(value, 4)

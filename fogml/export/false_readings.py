@@ -87,9 +87,8 @@ def false_reading_lines(told: dict[str, Any] | None) -> list[str]:
         return []
     first, *_, last = told["largest_error"]
     return [
-        f"readings      believed within {short(told['step_degC'])} degC and "
-        f"{short(told['rate_degC_s'])} degC/s of "
-        "the last good one;",
+        f"readings      believed within {short(told['step_degC'])} degC and {short(told['rate_degC_s'])} "
+        "degC/s of the last good one;",
         f"              a false one that passes is off by up to {short(first['off_degC'])} degC and "
         "makes, at",
         f"              flag 0, an error of up to {short(first['one_deg_h'])} deg/h, a spell of such "

@@ -107,9 +107,8 @@ def hold_within(
         and difference.scale_ppm > _MOST_SCALE_PPM
     ):
         raise InputError(
-            f"export: in {dtype} the scale factor differs by up to {short(difference.scale_ppm)} "
-            "ppm, more than "
-            f"{_MOST_SCALE_PPM:g} ppm; choose a finer --dtype, or state --tolerance. Nothing was written"
+            f"export: in {dtype} the scale factor differs by up to {short(difference.scale_ppm)} ppm, more "
+            f"than {_MOST_SCALE_PPM:g} ppm; choose a finer --dtype, or state --tolerance. Nothing was written"
         )
 
 

@@ -107,9 +107,8 @@ def export_tables(
     for axis, error in errors.items():
         if settings.tolerance is not None and error > settings.tolerance:
             raise InputError(
-                f"export: axis {axis}: what is written is off by {short(error)} deg/h from the model "
-                "at rest, "
-                f"more than the tolerance of {short(settings.tolerance)} deg/h. Nothing was written"
+                f"export: axis {axis}: what is written is off by {short(error)} deg/h from the model at "
+                f"rest, more than the tolerance of {short(settings.tolerance)} deg/h. Nothing was written"
             )
     return {
         "schema": SCHEMA,

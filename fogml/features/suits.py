@@ -44,9 +44,8 @@ def unsuited(atom: Atom, runs: Sequence[Run]) -> tuple[str, str] | None:
         span = max(float(v.max()) for v in values) - min(float(v.min()) for v in values)
         if 2.0 * atom.memory > span:
             return (
-                f"a half width of {atom.memory:g}, but {atom.signal.text} spans {short(span, 4)} in "
-                "the training "
-                "runs, less than the play",
+                f"a half width of {atom.memory:g}, but {atom.signal.text} spans {short(span, 4)} in the "
+                "training runs, less than the play",
                 f"state at most {short(0.5 * span)}, or train over a wider range",
             )
     return None

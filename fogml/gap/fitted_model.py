@@ -135,8 +135,7 @@ def _beside(
 ) -> FloatArray:
     """Coefficients beside effects as a replay with constants `about` some has them, shape (q,).
 
-    Where an effect is not quite in proportion to its size, or meets another constant than it was fitted
-    with, constants take up what is left.
+    Where an effect meets another constant than it was fitted with, constants take up what is left.
     """
     setting, count = found.setting, len(found.setting.constants)
     at = {c.name: float(c.mean + sd * x) for c, sd, x in zip(setting.constants, setting.deviations, about)}

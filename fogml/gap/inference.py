@@ -192,9 +192,8 @@ def _check_motion(scene: Scene, least_degc: float) -> None:
     moved = max(float(np.ptp(r.temperature)) for r in scene.fit)
     if moved < least_degc and not any(np.any(r.run.rate) for r in scene.fit):
         raise InputError(
-            f"{', '.join(r.run.name for r in scene.fit)}: temperature moves by {short(moved, 2)} "
-            "degC in all; "
-            f"a diagnosis needs a run in which it moves by {least_degc:g} degC or more"
+            f"{', '.join(r.run.name for r in scene.fit)}: temperature moves by {short(moved, 2)} degC in "
+            f"all; a diagnosis needs a run in which it moves by {least_degc:g} degC or more"
         )
 
 

@@ -144,10 +144,9 @@ def assumed(found: Inference, constants: Sequence[ConstantFit]) -> tuple[str, ..
         off = abs(fit.value - fit.prior_mean) / fit.prior_sd
         if fit.name in setting.widened and off > setting.priors.noise.far_off:
             said.append(
-                f"{fit.name} = {short(fit.value, 4)} {fit.unit} is {short(off)} standard deviations "
-                "off what was "
-                f"expected ({fit.prior_mean:g} ± {fit.prior_sd:g}): a unit, a sign or the twin may be wrong. "
-                f"Its prior was widened {short(setting.widened[fit.name])} times for the rest."
+                f"{fit.name} = {short(fit.value, 4)} {fit.unit} is {short(off)} standard deviations off what "
+                f"was expected ({fit.prior_mean:g} ± {fit.prior_sd:g}): a unit, a sign or the twin may be "
+                f"wrong. Its prior was widened {short(setting.widened[fit.name])} times for the rest."
             )
     for rows in setting.scene.runs:
         if rows.masked:

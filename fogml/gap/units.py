@@ -84,9 +84,8 @@ class UnitsDiagnosis:
             if c.next_unit is not None and c.mean is not None:
                 low, high = c.next_unit
                 line += (
-                    f"; mean {short(c.mean.value)} ± {short(c.mean.se, 2)}, {short(c.spread, 2)} "
-                    "from unit to unit: "
-                    f"the next unit's lies between {short(low)} and {short(high)} {c.unit} (90 %)"
+                    f"; mean {short(c.mean.value)} ± {short(c.mean.se, 2)}, {short(c.spread, 2)} from unit "
+                    f"to unit: the next unit's lies between {short(low)} and {short(high)} {c.unit} (90 %)"
                 )
             said.append(line + ".")
         return tuple(said)

@@ -139,8 +139,7 @@ def set_up_notes(
     if latitude is None:
         return [
             "no latitude is stated: the horizontal Earth rate is the one seen, "
-            f"{short(fix.horizontal_deg_h, 4)} "
-            "deg/h",
+            f"{short(fix.horizontal_deg_h, 4)} deg/h",
             *told,
         ]
     expected = horizontal_rate(latitude)
@@ -149,10 +148,9 @@ def set_up_notes(
         tolerance += 5.0 * float(np.sqrt(covariance[:2, :2].trace()))
     if abs(fix.horizontal_deg_h - expected) > tolerance:
         told.append(
-            f"the positions show {short(fix.horizontal_deg_h, 4)} deg/h of Earth rate, "
-            f"{short(expected, 4)} deg/h were "
-            f"expected at latitude {latitude:g} deg: the axis is not level, the scale factor is off, or the "
-            "positions are not what they are called"
+            f"the positions show {short(fix.horizontal_deg_h, 4)} deg/h of Earth rate, {short(expected, 4)} "
+            f"deg/h were expected at latitude {latitude:g} deg: the axis is not level, the scale factor is "
+            "off, or the positions are not what they are called"
         )
     return told
 

@@ -193,10 +193,9 @@ def _of_drift(run: Run, plateaus: Plateaus, most: float = 0.1, steady_degC: floa
     if moved <= most:
         return ()
     return (
-        f"The rates grow or fall over the test, and {over}: a scale factor that drifts by 1 ppm meanwhile is "
-        f"told {short(moved, 2)} ppm off its middle, with a nonlinearity of {short(bent, 2)} ppm "
-        "that is none; no "
-        "interval holds that. Let the rates come again the other way round.",
+        f"The rates grow or fall over the test, and {over}: a scale factor that drifts by 1 ppm meanwhile "
+        f"is told {short(moved, 2)} ppm off its middle, with a nonlinearity of {short(bent, 2)} ppm that is "
+        "none; no interval holds that. Let the rates come again the other way round.",
     )
 
 

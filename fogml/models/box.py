@@ -112,9 +112,8 @@ def refusals(runs: Sequence[Run]) -> list[str]:
     span = high - low
     if span == 0.0:
         return [
-            f"one temperature only, {short(low, 4)} degC: nothing can be told of drift over "
-            "temperature; record a "
-            "ramp up and a ramp down over the range of use"
+            f"one temperature only, {short(low, 4)} degC: nothing can be told of drift over temperature; "
+            "record a ramp up and a ramp down over the range of use"
         ]
     steps = [np.diff(np.unique(T)) for T in temperatures]
     resolution = min((float(step.min()) for step in steps if len(step)), default=0.0)

@@ -226,7 +226,7 @@ def _rates(run: RunJudgement) -> str:
 
 def signed(value: float) -> str:
     """A number in few digits with a typeset sign."""
-    return f"{short(value, 4)}".replace("-", "\N{MINUS SIGN}")
+    return short(value, 4).replace("-", "\N{MINUS SIGN}")
 
 
 def card_line(card: dict[str, str]) -> list[str]:

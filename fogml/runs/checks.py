@@ -143,9 +143,8 @@ def _irregular(run: Run) -> Iterator[Finding]:
         count += int(np.count_nonzero(off))
     if count > _IRREGULAR_SHARE * (len(run) - 1):
         message = (
-            f"{count} of {len(run) - 1} intervals differ from the median of {short(run.sample_s, 4)} "
-            "s by more "
-            "than a tenth; true times are used"
+            f"{count} of {len(run) - 1} intervals differ from the median of {short(run.sample_s, 4)} s by "
+            "more than a tenth; true times are used"
         )
         yield Finding("irregular_sampling", message, column="time", row=first, count=count)
 

@@ -95,9 +95,8 @@ def words_of(terms: NoiseTerms, series: NoiseSeries, runs: Sequence[Run]) -> lis
     words = []
     if series.hold != 1.0:
         words.append(
-            f"Each value stands for {short(series.hold)} samples: the log reads faster than the gyro "
-            "gives new "
-            f"values, every {short(series.new_s)} s. Terms are of the new values."
+            f"Each value stands for {short(series.hold)} samples: the log reads faster than the gyro gives "
+            f"new values, every {short(series.new_s)} s. Terms are of the new values."
         )
     told = model_told(terms, np.array([series.sample_s]), series)["filter"]
     if told is not None and told["kind"] == "other":
@@ -109,9 +108,8 @@ def words_of(terms: NoiseTerms, series: NoiseSeries, runs: Sequence[Run]) -> lis
     elif told is not None:
         corner = f" at {short(told['corner_hz'])} Hz" if told["corner_hz"] else ""
         words.append(
-            f"The output is filtered ({told['words']}{corner}): terms are of the noise ahead of the "
-            f"filter, and the Allan deviation "
-            f"shows them from {short(max(terms.holds_from_s, series.new_s))} s on."
+            f"The output is filtered ({told['words']}{corner}): terms are of the noise ahead of the filter, "
+            f"and the Allan deviation shows them from {short(max(terms.holds_from_s, series.new_s))} s on."
         )
     gaps = gaps_of(runs)
     if gaps["count"]:
@@ -131,12 +129,10 @@ def coarse_steps(series: NoiseSeries) -> list[dict[str, str]]:
         return []
     angle = step * series.new_s
     message = (
-        f"The output comes in steps of {short(step)} deg/h ({short(angle)} arcsec a sample), and its "
-        "noise hardly "
-        "moves it from one to the next: what rounding makes is then no white noise, and Q and N may be off "
-        "by more than their intervals. Steps of an angle make a Q of "
-        f"{short(angle * _URAD / 12.0**0.5)} urad; "
-        "record more slowly, or finer, for N."
+        f"The output comes in steps of {short(step)} deg/h ({short(angle)} arcsec a sample), and its noise "
+        "hardly moves it from one to the next: what rounding makes is then no white noise, and Q and N may "
+        "be off by more than their intervals. Steps of an angle make a Q of "
+        f"{short(angle * _URAD / 12.0**0.5)} urad; record more slowly, or finer, for N."
     )
     return [{"code": "coarse_steps", "message": message}]
 
@@ -151,9 +147,8 @@ def rounded_log(series: NoiseSeries, terms: NoiseTerms) -> list[dict[str, str]]:
     if less < ROUNDED or share >= 1.0 or terms.terms["Q"].lower > 0.0:
         return []
     message = (
-        f"The output comes in steps of {short(step)} deg/h: if the log rounds to them, and no angle "
-        "is counted, "
-        f"N holds the rounding too, and that of the gyro itself is {less:.1%} less."
+        f"The output comes in steps of {short(step)} deg/h: if the log rounds to them, and no angle is "
+        f"counted, N holds the rounding too, and that of the gyro itself is {less:.1%} less."
     )
     return [{"code": "rounded_log", "message": message}]
 

@@ -71,7 +71,7 @@ FAR_DEGC = 10.0
 SPREADSHEET_DAYS = (36526.0, 73050.0)
 """Days as spreadsheets count them, of the years 2000 to 2099."""
 DAY_S = 86400.0
-_PARTS = 64
+_PARTS = 64  # of a run, whose means noise moves little, and which a ramp of a chamber still spans
 _ENDS = (0.02, 0.98)
 Ends = tuple[float, float]
 
@@ -175,9 +175,8 @@ def _thermometers(run: Run, names: Sequence[str]) -> Iterator[Finding]:
     a, b = max(pairs, key=lambda pair: means[pair[1]] - means[pair[0]], default=(None, None))
     if a is not None and b is not None and a not in odd and b not in odd and means[b] - means[a] > APART_DEGC:
         why = (
-            f"'{a}' and '{b}' differ by {short(means[b] - means[a], 4)} degC ({short(means[a], 4)} "
-            f"and {short(means[b], 4)}): "
-            "is one of them in another unit, or dead?"
+            f"'{a}' and '{b}' differ by {short(means[b] - means[a], 4)} degC ({short(means[a], 4)} and "
+            f"{short(means[b], 4)}): is one of them in another unit, or dead?"
         )
         yield Finding("thermometers_apart", why, column=a, count=len(run))
 
@@ -191,9 +190,8 @@ def _hot(run: Run, names: Sequence[str]) -> Iterator[Finding]:
         low, high = large.quantiles(large.parts_of(run.columns[name]), _ENDS)
         if high > hot:
             message = (
-                f"'{name}' reads {short(low, 4)} to {short(high, 4)} degC, hotter than fibre gyros "
-                "are built for: "
-                "Fahrenheit? Write its header with [degF]; if it was so hot, nothing is to be done"
+                f"'{name}' reads {short(low, 4)} to {short(high, 4)} degC, hotter than fibre gyros are built "
+                "for: Fahrenheit? Write its header with [degF]; if it was so hot, nothing is to be done"
             )
             yield Finding("implausible_temperature", message, column=name, count=len(run))
 
@@ -218,10 +216,9 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
         fast = moved > FASTEST_DEGC_PER_MIN / 60.0 * within_s
         if moved[fast].sum() >= FAR_DEGC:
             told = (
-                f"'{name}' moves by {short(moved[fast].sum())} degC in {short(within_s[fast].sum())} "
-                "s in all, "
-                "faster than a chamber takes a gyro: is the clock in minutes, hours or days? Write "
-                "its header as 'time [min]', 'time [h]' or 'time [d]'"
+                f"'{name}' moves by {short(moved[fast].sum())} degC in {short(within_s[fast].sum())} s in "
+                "all, faster than a chamber takes a gyro: is the clock in minutes, hours or days? Write its "
+                "header as 'time [min]', 'time [h]' or 'time [d]'"
             )
             yield Finding("implausible_clock", told, column="time", count=len(run))
             return

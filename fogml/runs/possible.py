@@ -104,8 +104,7 @@ def float32_reason(time: FloatArray) -> str | None:
         return None
     return (
         f"the times are in single precision (float32), whose numbers near {short(greatest, 4)} are "
-        f"{short(apart)} s "
-        "apart; take the start off in double precision before they are stored"
+        f"{short(apart)} s apart; take the start off in double precision before they are stored"
     )
 
 

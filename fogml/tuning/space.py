@@ -170,7 +170,7 @@ class Space(Strict):
 
 def window_text(seconds: float) -> str:
     """A window's length to three significant digits, as feature text takes it."""
-    return f"{float(f'{short(seconds)}'):g}"
+    return f"{float(short(seconds)):g}"
 
 
 def _of(trial: optuna.Trial, name: str, choices: list[str]) -> str:

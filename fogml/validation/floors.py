@@ -177,8 +177,7 @@ def out_of_reach(
     if index >= low:
         return None
     return (
-        f"No model can reach the design index of {index:g} deg/h: the noise alone leaves "
-        f"{short(floor)} deg/h "
-        f"rms ({short(low)} to {short(high)}, {LEVEL:.0%}) in {count} averages over {averaging_s:g} "
-        f"s of {where}"
+        f"No model can reach the design index of {index:g} deg/h: the noise alone leaves {short(floor)} "
+        f"deg/h rms ({short(low)} to {short(high)}, {LEVEL:.0%}) in {count} averages over {averaging_s:g} s "
+        f"of {where}"
     )

@@ -110,9 +110,8 @@ class IndexSearch:
         )
         tries = counted(len(self.trials), "try", "tries")
         return (
-            f"Searched on folds of the training runs in {tries}: {outcome} "
-            f"({short(self.chosen.rms, 4)} deg/h against {self.design_index:g}). The test runs were "
-            "judged once."
+            f"Searched on folds of the training runs in {tries}: {outcome} ({short(self.chosen.rms, 4)} "
+            f"deg/h against {self.design_index:g}). The test runs were judged once."
         )
 
 

@@ -54,12 +54,14 @@ def implausible_reasons(run: RunJudgement) -> Iterator[Reason]:
             )
 
 
-UNITS_APART = 1000.0
-"""What two runs of one gyro move by, and their noise, differ by less unless one is in deg/s: 3600 times."""
+def unit_reasons(
+    train: Sequence[RunJudgement], test: Sequence[RunJudgement], *, units_apart: float = 1000.0
+) -> Iterator[Reason]:
+    """What speaks against a model where a run seems to be in another unit than those trained on.
 
-
-def unit_reasons(train: Sequence[RunJudgement], test: Sequence[RunJudgement]) -> Iterator[Reason]:
-    """What speaks against a model where a run seems to be in another unit than those trained on."""
+    What two runs of one gyro move by, and their noise, both differ by less than `units_apart` times unless
+    one is in deg/s: that is 3600 times deg/h.
+    """
     for run in test:
         for other in train:
             moves = run.before.bias_stability, other.before.bias_stability
@@ -67,15 +69,13 @@ def unit_reasons(train: Sequence[RunJudgement], test: Sequence[RunJudgement]) ->
             if min(*moves, *noises) <= 0.0:
                 continue
             apart = [a / b for a, b in (moves, noises)]
-            if min(apart) > UNITS_APART or max(apart) < 1.0 / UNITS_APART:
+            if min(apart) > units_apart or max(apart) < 1.0 / units_apart:
                 yield Reason(
                     "do_not_use",
                     f"{run.run} and {other.run} seem to be in different units",
-                    f"{run.run} moves by {short(moves[0])} deg/h and {other.run} by "
-                    f"{short(moves[1])}, and their "
-                    f"noise is as far apart ({short(noises[0], 2)} and {short(noises[1], 2)}): is "
-                    "one of them in deg/s, "
-                    "3600 times deg/h?",
+                    f"{run.run} moves by {short(moves[0])} deg/h and {other.run} by {short(moves[1])}, and "
+                    f"their noise is as far apart ({short(noises[0], 2)} and {short(noises[1], 2)}): is one "
+                    "of them in deg/s, 3600 times deg/h?",
                     "Put the unit of the output right, and train and judge again.",
                 )
                 return
@@ -124,9 +124,8 @@ def gained_reasons(run: RunJudgement) -> Iterator[Reason]:
         yield Reason(
             "use_with_care",
             f"leaves most of it on {run.run}",
-            f"On {run.run} {short(before)} deg/h rms become {short(after)}: less is gained than the "
-            "noise floor of "
-            f"{short(run.floor)}, and more is left.",
+            f"On {run.run} {short(before)} deg/h rms become {short(after)}: less is gained than the noise "
+            f"floor of {short(run.floor)}, and more is left.",
             "Compare other models (fogml compare).",
         )
     elif steadier < -run.floor:

@@ -131,7 +131,7 @@ def _steps_again(rows: Rows) -> tuple[list[str], float]:
             continue
         if soaked:
             said.append(f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min")
-        speed = float(f"{short(abs(to - at) / minutes)}")
+        speed = float(short(abs(to - at) / minutes))
         fastest = max(fastest, speed)
         said.append(f"ramp to {to:g} degC at {speed:g} degC/min")
         at, soaked = to, 0.0
