@@ -14,8 +14,7 @@ from fogml.arrays import FloatArray
 from fogml.models.names import make_model
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-from fogml.tuning.plan import Plan
-from fogml.tuning.space import Choice, Space
+from fogml.tuning.plan import Choice, Plan, Space
 from fogml.tuning.sweep import run_sweep
 from fogml.tuning.winner import AUTO, DEFAULT, complete, reference_choices, winner
 

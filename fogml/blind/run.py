@@ -17,7 +17,7 @@ import fogml
 from fogml.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files, read_json
 from fogml.blind.methods import ORACLE, code_state
 from fogml.blind.pool import Worker, WorkerLost
-from fogml.blind.sealing import own_roots, within
+from fogml.blind.worker import own_roots, within
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import folder_to_fill, settled, whole_folder

@@ -2,20 +2,158 @@
 
 ``python -m fogml.blind.worker METHOD [CODE_FOLDER]`` in the folder that it may use; METHOD is
 ``package.module:function``, called with `CaseFiles`, the folder for its answer, and options.
+
+It can't reach the truth: it may read its own code and one folder, and nothing else. Two locks. An audit
+hook (PEP 578) refuses every open, listing and child process that Python knows of outside the allowed
+folders, on any system. Where the kernel has Landlock (Linux 5.13 and later) it refuses the same to code
+below Python, threads and children included. Neither is told where the truth lies.
 """
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import sys
+import sysconfig
 import time
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from fogml.blind.sealing import seal
 from fogml.processes import begin_worker
+
+_SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc", "/proc", "/sys", "/dev", "/nix/store")
+_OPENING = {
+    "open",
+    "os.listdir",
+    "os.scandir",
+    "os.chdir",
+    "os.truncate",
+    "os.remove",
+    "os.rmdir",
+    "os.mkdir",
+}
+_PAIRS = {"os.rename", "os.link", "os.symlink"}
+_LEAVING = {"subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "pty.spawn"}
+
+# Numbers of the system calls are the same on every architecture that Linux has them on.
+_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
+_VERSION_FLAG, _PATH_BENEATH, _NO_NEW_PRIVILEGES = 1, 1, 38
+_EXECUTE, _WRITE_FILE, _READ_FILE, _READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
+_READING = _EXECUTE | _READ_FILE | _READ_DIR
+# Rights that came with each version: all of the first, moves between folders, truncation.
+_RIGHTS = {1: (1 << 13) - 1, 2: 1 << 13, 3: 1 << 14}
+_FILE_RIGHTS = _EXECUTE | _WRITE_FILE | _READ_FILE | _RIGHTS[3]
+
+
+class _RulesetAttributes(ctypes.Structure):
+    _fields_ = [("handled_access_fs", ctypes.c_uint64)]
+
+
+class _PathBeneath(ctypes.Structure):
+    _pack_ = 1
+    _layout_ = "ms"
+    _fields_ = [("allowed_access", ctypes.c_uint64), ("parent_fd", ctypes.c_int32)]
+
+
+class OutOfReach(PermissionError):
+    """A sealed process asked for something that it must not see."""
+
+
+def own_roots() -> tuple[Path, ...]:
+    """Folders that any sealed process may read: Python, installed packages, this one, the system's."""
+    import fogml
+
+    stated = [sys.prefix, sys.base_prefix, sys.exec_prefix, *sysconfig.get_paths().values(), *_SYSTEM]
+    stated.append(str(Path(fogml.__file__).parent))
+    return tuple(sorted({Path(os.path.realpath(path)) for path in stated if os.path.isdir(path)}))
+
+
+def within(path: str | Path, roots: Iterable[Path]) -> bool:
+    """Whether a path, its links followed, lies in one of the folders or is one."""
+    real = Path(os.path.realpath(path))
+    return any(real == root or root in real.parents for root in roots)
+
+
+def seal(folder: Path, more: Iterable[Path] = ()) -> str:
+    """Shut this process in, for good; returns the locks in use: ``landlock and audit`` or ``audit``.
+
+    Parameters
+    ----------
+    folder
+        Where it may read and write.
+    more
+        Further folders of code that it may read.
+    """
+    import fogml
+
+    roots = tuple({*own_roots(), *(Path(os.path.realpath(path)) for path in more)})
+    # Compiled code is kept beside its source.
+    writable = (Path(os.path.realpath(folder)), Path(os.path.realpath(fogml.__file__)).parent, Path("/dev"))
+    locked = _landlock(roots, writable)
+    sys.addaudithook(_hook((*roots, *writable)))
+    return "landlock and audit" if locked else "audit"
+
+
+def _hook(allowed: tuple[Path, ...]) -> Any:
+    def check(path: Any) -> None:
+        # Descriptors that are open already were checked when they were opened.
+        if path is None or isinstance(path, int) or within(os.fsdecode(path), allowed):
+            return
+        raise OutOfReach(f"{os.fsdecode(path)}: out of reach of a sealed diagnosis")
+
+    def hook(event: str, arguments: tuple[Any, ...]) -> None:
+        if event in _OPENING:
+            check(arguments[0] if arguments else None)
+        elif event in _PAIRS:
+            check(arguments[0])
+            check(arguments[1])
+        elif event in _LEAVING:
+            raise OutOfReach(f"{event}: a sealed diagnosis starts no other process")
+
+    return hook
+
+
+def _landlock(readable: Iterable[Path], writable: Iterable[Path]) -> bool:
+    """Restrict this process by Landlock; False where the kernel has none."""
+    if not sys.platform.startswith("linux"):
+        return False
+    library = ctypes.CDLL(None, use_errno=True)
+    call = library.syscall
+    call.restype = ctypes.c_long
+    version = call(_CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(_VERSION_FLAG))
+    if version < 1:
+        return False
+    everything = sum(rights for since, rights in _RIGHTS.items() if since <= version)
+    attributes = _RulesetAttributes(everything)
+    size = ctypes.c_size_t(ctypes.sizeof(attributes))
+    ruleset = call(_CREATE_RULESET, ctypes.byref(attributes), size, ctypes.c_uint32(0))
+    if ruleset < 0:
+        return False
+    try:
+        for paths, rights in ((readable, _READING), (writable, everything)):
+            for path in paths:
+                _allow(call, ruleset, path, rights)
+        library.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+        return bool(call(_RESTRICT_SELF, ctypes.c_int(ruleset), ctypes.c_uint32(0)) == 0)
+    finally:
+        os.close(ruleset)
+
+
+def _allow(call: Any, ruleset: int, path: Path, rights: int) -> None:
+    try:
+        descriptor = os.open(path, os.O_PATH | os.O_CLOEXEC)
+    except OSError:
+        return
+    try:
+        rule = _PathBeneath(rights if path.is_dir() else rights & _FILE_RIGHTS, descriptor)
+        kind, none = ctypes.c_int(_PATH_BENEATH), ctypes.c_uint32(0)
+        call(_ADD_RULE, ctypes.c_int(ruleset), kind, ctypes.byref(rule), none)
+    finally:
+        os.close(descriptor)
+
 
 READY = "ready"
 

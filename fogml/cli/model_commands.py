@@ -12,7 +12,7 @@ from fogml.cli.settings import Settings
 from fogml.errors import known_are, quoted
 from fogml.strict import first_fault
 from fogml.tracking import shown_tracker
-from fogml.tuning.space import Space
+from fogml.tuning.plan import Space
 
 
 class TrainSettings(options.LimitSettings):

@@ -21,7 +21,7 @@ from fogml.features.terms import Term, atom_columns, atom_matrix, compose, compo
 from fogml.features.transformer import Transformer
 from fogml.runs.dropouts import RULE, DropoutRule
 from fogml.runs.run import Run
-from fogml.runs.thermometer_limits import SavedLimits, rule_of
+from fogml.runs.thermometers import SavedLimits, rule_of
 
 if TYPE_CHECKING:
     from fogml.features.blocks import FeatureBlocks

@@ -17,7 +17,7 @@ from fogml.features.features import Features
 from fogml.features.slices import SavedSlices
 from fogml.models.box import slices_of
 from fogml.runs.run import Run
-from fogml.runs.thermometer_limits import SavedLimits, saved_limits, trained_limits
+from fogml.runs.thermometers import SavedLimits, saved_limits, trained_limits
 from fogml.strict import CONTENT
 
 

@@ -18,8 +18,7 @@ import numpy as np
 from fogml.arrow_arrays import values_of
 from fogml.errors import InputError
 from fogml.runs.csv_dialect import CsvDialect, csv_dialect
-from fogml.runs.csv_end import cut_error, cut_line, note_of_end, without_footer
-from fogml.runs.csv_lines import LineReader, line_of_row
+from fogml.runs.csv_lines import LineReader, cut_error, cut_line, line_of_row, note_of_end, without_footer
 from fogml.runs.csv_numbers import MISSING
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column

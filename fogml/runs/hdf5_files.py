@@ -1,4 +1,4 @@
-"""HDF5 files: one dataset per column, at the root or in a group ``run``.
+"""HDF5 and MATLAB files: one dataset or vector per column, at the top or in a group or struct ``run``.
 
 A dataset is named ``name [unit]``, or ``name`` with an attribute ``unit``. Set-up facts are attributes of
 the same group: JSON in ``fogml.facts``, as `write_run` puts them, or one attribute per fact. With h5py::
@@ -8,27 +8,40 @@ the same group: JSON in ``fogml.facts``, as `write_run` puts them, or one attrib
         file.attrs["unit"], file.attrs["axis"], file.attrs["latitude"] = "FOG-0417", "x", 39.9
 
 HDF5 makes a group ``gyro [deg`` of that name with a dataset ``h]`` in it; it is read as it was meant.
+
+In MATLAB files, versions 5 to 7.3, a vector is named as the column (``time``, ``gyro``, ``T_in``); its unit
+stands under the same name in a struct ``units``. Set-up facts stand as JSON text in ``facts``. In MATLAB::
+
+    time = (0:35999)'; gyro = ...; T_in = ...;
+    units.time = 's'; units.gyro = 'deg/h'; units.T_in = 'degC';
+    facts = jsonencode(struct('unit', 'FOG-0417', 'axis', 'x'));
+    save('run.mat', 'time', 'gyro', 'T_in', 'units', 'facts')
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator
+import re
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from fogml.errors import InputError, quoted
+import numpy as np
+
+from fogml.errors import InputError, listed, quoted
 from fogml.runs.columns import parse_header
-from fogml.runs.facts import Facts
+from fogml.runs.container_files import Group, grouped, unknown_fields
+from fogml.runs.facts import Facts, facts_from
 from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.raw_table import (
     FACTS_KEY,
     RawTable,
     choose_vectors,
     embedded_facts,
+    facts_from_json,
     stored_blocks,
 )
-from fogml.runs.reader_process import StoredArray, stored_file
+from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 
@@ -66,13 +79,13 @@ def hdf5_blocks(
             raise InputError(f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'")
         vectors, findings = choose_vectors(
             path.name,
-            list(zip(canonical_cells([_cell(a) for a in stored.arrays]), stored.arrays, strict=True)),
+            list(zip(canonical_cells([_cell_of(a) for a in stored.arrays]), stored.arrays, strict=True)),
         )
         facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the attributes")
         yield from stored_blocks(stored, vectors, findings, facts, rows, columns)
 
 
-def _cell(array: StoredArray) -> str:
+def _cell_of(array: StoredArray) -> str:
     return array.name if array.unit is None else f"{parse_header(array.name)[0]} [{array.unit}]"
 
 
@@ -99,3 +112,107 @@ def write_hdf5(run: Run, cells: dict[str, str], path: Path) -> None:
             if unit is not None:
                 dataset.attrs["unit"] = unit
         file.attrs[FACTS_KEY] = json.dumps(run.facts.as_dict(), ensure_ascii=False)
+
+
+_USER_BLOCK = 512
+_LARGEST_V5_BYTES = 1 << 31
+_RESERVED = ("units", "facts")
+_VARIABLE = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}\Z")
+
+
+def mat_blocks(
+    path: Path,
+    rows: int | None,
+    columns: Collection[str] | None = None,
+    limits: ReadingLimits = DEFAULT_LIMITS,
+) -> Iterator[RawTable]:
+    """The table of a MATLAB file in blocks of `rows` rows; all at once for None.
+
+    Only time, gyro and `columns` are read where these are given. The process that reads
+    it holds a variable of version 5 whole while it is unpacked.
+    """
+    with stored_file(path, "mat", (), limits) as stored:
+        units, stated = stored.told["units"], stored.told["facts"]
+        if units is None:
+            raise InputError(f"{path.name}: 'units' must be a struct of texts, e.g. units.time = 's'")
+        if not stored.arrays:
+            raise InputError(f"{path.name}: holds no numeric vectors; time, gyro and others were expected")
+        vectors, findings = choose_vectors(path.name, _chosen(path, stored, units))
+        source = f"{path.name}, facts"
+        facts = facts_from_json(stated, source) if isinstance(stated, str) else facts_from(stated, source)
+        yield from stored_blocks(stored, vectors, findings, None if stated is None else facts, rows, columns)
+
+
+def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> list[tuple[str, StoredArray]]:
+    """The variables at the top, or those of the only struct that holds a time and a gyro."""
+    groups = [
+        Group(
+            name,
+            tuple(zip(canonical_cells([_cell(a.name, a.unit or units.get(a.name)) for a in held]), held)),
+        )
+        for name, held in grouped(stored).items()
+    ]
+    runs = [group for group in groups if group.is_run]
+    # What stands at the top comes before what else is kept.
+    runs = [group for group in runs if not group.name] or runs
+    if len(runs) > 1:
+        names = listed([group.name for group in runs])
+        raise InputError(
+            f"{path.name}: {names} each hold a time and a gyro; save the one that is meant as its own file"
+        )
+    if not runs and len(groups) > 1:
+        raise unknown_fields(path, "mat", groups)
+    return list((runs or groups)[0].columns)
+
+
+def _cell(name: str, unit: str | None) -> str:
+    return name if unit is None else f"{parse_header(name)[0]} [{unit.strip()}]"
+
+
+def write_mat(
+    run: Run, cells: dict[str, str], path: Path, version: Literal["5", "7.3"] | None = None
+) -> None:
+    """Write a run to a new MATLAB file: version 5, or 7.3 where asked or where 5 can't hold it.
+
+    Raises
+    ------
+    InputError
+        If a column's name can't be a variable's.
+    """
+    labels = {name: parse_header(cell) for name, cell in cells.items()}
+    for label, _ in labels.values():
+        if not _VARIABLE.match(label) or label in (*_RESERVED, "run"):
+            raise InputError(
+                f"{path.name}: column {quoted(label)} can't be named so in a MATLAB file; rename it to "
+                "letters, digits and underscores, or write CSV or Parquet"
+            )
+    if version is None:
+        version = "7.3" if 8 * len(run) >= _LARGEST_V5_BYTES else "5"
+    facts = json.dumps(run.facts.as_dict(), ensure_ascii=True)
+    units = {label: unit for label, unit in labels.values() if unit is not None}
+    if version == "5":
+        from scipy.io import savemat
+
+        vectors: dict[str, Any] = {label: run.columns[name][:, None] for name, (label, _) in labels.items()}
+        savemat(path, {**vectors, "units": units, "facts": facts}, long_field_names=True, do_compression=True)
+        return
+    with h5py_module().File(path, "w", userblock_size=_USER_BLOCK, track_order=True) as file:
+        for name, (label, _) in labels.items():
+            dataset = file.create_dataset(label, data=run.columns[name][None, :], compression="gzip")
+            dataset.attrs["MATLAB_class"] = np.bytes_("double")
+        group = file.create_group("units")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for label, unit in units.items():
+            _write_text(group, label, unit)
+        _write_text(file, "facts", facts)
+    # MATLAB tells its own files by this block before the HDF5 part.
+    text = b"MATLAB 7.3 MAT-file, Platform: fogml, Created on: unknown HDF5 schema 1.00 ."
+    with path.open("r+b") as raw:
+        raw.write(text.ljust(116) + b"\x00" * 8 + b"\x00\x02IM")
+
+
+def _write_text(group: Any, name: str, text: str) -> None:
+    codes = np.array([[ord(character)] for character in text], dtype=np.uint16)
+    dataset = group.create_dataset(name, data=codes)
+    dataset.attrs["MATLAB_class"] = np.bytes_("char")
+    dataset.attrs["MATLAB_int_decode"] = np.int32(2)

@@ -6,8 +6,16 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from fogml.runs.columns import KNOWN, coil_sensor_number, column_spec, is_accepted, parse_header
-from fogml.runs.units import canonical_unit, is_unit, signs
+from fogml.runs.columns import (
+    KNOWN,
+    canonical_unit,
+    coil_sensor_number,
+    column_spec,
+    is_accepted,
+    is_unit,
+    parse_header,
+    signs,
+)
 
 DATE_NAMES = frozenset({"date", "datum", "日期"})
 """What a column of dates beside one of times of day is called."""

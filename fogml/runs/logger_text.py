@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError, counted, listed, quoted
-from fogml.runs.csv_end import cut_error, cut_line
+from fogml.runs.csv_lines import cut_error, cut_line
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
 from fogml.runs.logger_lines import (

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from fogml.runs.units import canonical_unit
+from fogml.runs.columns import canonical_unit
 from fogml.strict import Strict
 
 _DECIMAL = r"([-+]?\d{1,30}(?:\.\d{0,30})?(?:[eE][-+]?\d{1,3})?)"

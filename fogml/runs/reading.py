@@ -242,7 +242,7 @@ def _table_blocks(
 
         return hdf5_blocks(path, rows, columns, limits)
     if kind == "mat":
-        from fogml.runs.mat_files import mat_blocks
+        from fogml.runs.hdf5_files import mat_blocks
 
         return mat_blocks(path, rows, columns, limits)
     from fogml.runs.container_files import container_blocks

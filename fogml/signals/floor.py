@@ -21,7 +21,7 @@ import numpy as np
 from fogml.arrays import FloatArray, IntArray
 from fogml.intervals import LEVEL, MEDIAN_SIZE
 from fogml.signals import large
-from fogml.signals.averages_noise import FastNoise, averages_variance, fast_noise
+from fogml.signals.averages import FastNoise, averages_variance, fast_noise
 from fogml.signals.distributions import students_ppf
 from fogml.signals.noise_spectrum import Rows, spectrum_of
 from fogml.signals.output_filters import SpectrumTerms

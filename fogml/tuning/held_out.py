@@ -25,7 +25,7 @@ from fogml.models.table import RunRows, TrainingTable, longest_interval_s, usabl
 from fogml.models.trial import averaged_rows, bare_table, held_out_prediction
 from fogml.models.weighing import Weighed
 from fogml.runs.run import Run
-from fogml.tuning.space import Choice, Space
+from fogml.tuning.plan import Choice, Space
 
 
 def held_out_predictions(

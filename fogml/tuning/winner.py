@@ -12,7 +12,7 @@ from fogml.errors import InputError
 from fogml.models.auto import AutoModel
 from fogml.models.names import make_model
 from fogml.runs.run import Run
-from fogml.tuning.space import Choice
+from fogml.tuning.plan import Choice
 from fogml.tuning.study import place_of
 from fogml.tuning.worker import score_of
 

@@ -14,8 +14,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import FogmlError
 from fogml.models.candidates import Candidate, Score
 from fogml.tuning.held_out import FoldResult, HeldOut
-from fogml.tuning.plan import Plan
-from fogml.tuning.space import Choice
+from fogml.tuning.plan import Choice, Plan
 from fogml.tuning.study import BEAT, Recovery, begin_trial, finished_count, free_place, place_of
 
 if TYPE_CHECKING:

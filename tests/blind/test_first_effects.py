@@ -15,9 +15,9 @@ from scipy.linalg import toeplitz
 from fogml.blind.first.effects.coil import SlipEvents
 from fogml.blind.first.noise import record_length
 from fogml.blind.first.reality import INVENTED, KNOWN, REALITY, WRONG_STRUCTURE, draw_unit
-from fogml.blind.first.recurrences import bouc_wen, lag, play, recurrence
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Form, compatible
+from fogml.blind.frame.operators import bouc_wen, lag, play, recurrence
 from fogml.blind.frame.strength import Acting, Reckoning, Scales, TooWeak, acting_before, recorded
 from fogml.blind.frame.unit import Unit
 from fogml.blind.make import recorded_run

@@ -10,7 +10,7 @@ import pytest
 from fogml.blind.folders import BlindFolder
 from fogml.blind.methods import load_method
 from fogml.blind.run import RunPlan, check_out_of_reach, run_cases
-from fogml.blind.sealing import own_roots
+from fogml.blind.worker import own_roots
 from fogml.cli.blind import RunSettings
 from fogml.cli.blind_job import run_and_tell
 from fogml.cli.terminal import Terminal

@@ -10,20 +10,23 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import toeplitz
 
-from fogml.blind.first.recurrences import bouc_wen, lag, play
 from fogml.blind.frame.form import Additive, Demands, Distorting, Form
 from fogml.blind.frame.noise import Whitening
-from fogml.blind.frame.operators import faded, late
-from fogml.blind.frame.unit import Unit
-from fogml.blind.plan import REALITIES, reality
-from fogml.blind.second.effects.lasting import LoopOfSlips
-from fogml.blind.second.memory import (
+from fogml.blind.frame.operators import (
     backlash,
+    bouc_wen,
     bouc_wen_general,
+    faded,
+    lag,
+    late,
     maxwell_slip,
+    play,
     preisach,
     slab_lag,
 )
+from fogml.blind.frame.unit import Unit
+from fogml.blind.plan import REALITIES, reality
+from fogml.blind.second.effects.lasting import LoopOfSlips
 from fogml.blind.second.plant import Plant, draw_plant
 from fogml.blind.second.reality import air_of, draw_chamber, draw_noise
 

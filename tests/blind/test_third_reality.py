@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from fogml.blind.first.recurrences import play
+from fogml.blind.frame.operators import play
 from fogml.blind.third.effects.winding import dead_zone_plays, duhem, eyring
 from fogml.blind.third.plant import NAMES, Plant, draw_plant, runge_kutta
 

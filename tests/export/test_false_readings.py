@@ -16,7 +16,7 @@ from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
 from fogml.runs.dropouts import RULE, read_thermometer
 from fogml.runs.run import Run
-from fogml.runs.thermometer_limits import LIMITS, trained_limits
+from fogml.runs.thermometers import LIMITS, trained_limits
 from tests.export.conftest import training_run
 from tests.export.test_c_code import QUICK, disturbed, fast_run, needs_cc, outputs
 

@@ -172,7 +172,7 @@ def test_commands_tell_before_they_read(command):
     ],
 )
 def test_every_value_of_a_search_space_is_checked(models, told):
-    from fogml.tuning.space import Space
+    from fogml.tuning.plan import Space
 
     with pytest.raises(InputError, match=told):
         Space.model_validate({"features": "T", "models": models}).check()
@@ -182,7 +182,7 @@ def test_every_value_of_a_search_space_is_checked(models, told):
     "models", [{"rbf": {"centres": []}}, {"polynomial": {"ridge": {"low": 0.0, "high": INF}}}]
 )
 def test_a_space_without_values_or_without_ends_is_told(models):
-    from fogml.tuning.space import Space
+    from fogml.tuning.plan import Space
 
     with pytest.raises(ValidationError):
         Space.model_validate({"features": "T", "models": models})

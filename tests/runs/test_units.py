@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.runs.columns import converted
 from fogml.runs.profiles import import_recording
 from fogml.runs.reading import read_run
-from fogml.runs.units import converted
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from fogml.signals.allan import segment_bounds
-from fogml.signals.averages_noise import FastNoise, averages_variance
+from fogml.signals.averages import FastNoise, averages_variance
 from fogml.signals.flicker import Flicker
 from fogml.signals.floor import Floor, floor_model, quiet_parts
 from fogml.signals.noise_expectation import floor_square

@@ -4,7 +4,7 @@ import numpy as np
 
 from fogml.models.table import TrainingTable
 from fogml.tuning.held_out import HeldOut, _apart
-from fogml.tuning.space import Choice, Space
+from fogml.tuning.plan import Choice, Space
 from tests.tuning.world import SPACE, runs
 
 

@@ -18,7 +18,7 @@ from fogml.models.names import make_model
 from fogml.report.sweep_page import standing
 from fogml.runs.run import Run
 from fogml.tuning.held_out import HeldOut
-from fogml.tuning.space import Choice, Space
+from fogml.tuning.plan import Choice, Space
 from fogml.tuning.storage import JOURNAL
 from fogml.tuning.study import begin_trial, free_place, is_finished, open_study
 from fogml.tuning.sweep import run_sweep, study_json

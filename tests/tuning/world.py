@@ -8,8 +8,7 @@ import numpy as np
 
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-from fogml.tuning.plan import Plan
-from fogml.tuning.space import Space
+from fogml.tuning.plan import Plan, Space
 
 SPACE: dict[str, Any] = {
     "features": {"static": ["T", "T^1..2"], "rate": ["", "dT[{builder}, {window} s]"]},

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import nnls
 
 from fogml.arrays import FloatArray
-from fogml.blind.first.recurrences import lag
 from fogml.blind.frame.noise import States
+from fogml.blind.frame.operators import lag
 from fogml.blind.frame.record import World
 
 Layout = str

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.special import erf
 
 from fogml.arrays import FloatArray
-from fogml.blind.first.recurrences import bouc_wen, lag, play, recurrence
 from fogml.blind.frame.form import Additive, Demands, ScaleFactor, Shape
+from fogml.blind.frame.operators import bouc_wen, lag, play, recurrence
 from fogml.blind.frame.record import World
 
 _LEAD_DEG_H_PER_M = 0.525

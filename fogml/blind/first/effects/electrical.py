@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.blind.first.recurrences import lag
 from fogml.blind.frame.form import Additive, Demands, Shape
+from fogml.blind.frame.operators import lag
 from fogml.blind.frame.record import World
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.blind.first.recurrences import play, recurrence
 from fogml.blind.frame.form import Additive, Shape
+from fogml.blind.frame.operators import play, recurrence
 from fogml.blind.frame.record import World
 
 

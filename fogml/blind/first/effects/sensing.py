@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.blind.first.recurrences import lag
 from fogml.blind.frame.form import Sensing, Shape
+from fogml.blind.frame.operators import lag
 from fogml.blind.frame.record import World
 
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.blind.first.recurrences import recurrence
 from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Shape
+from fogml.blind.frame.operators import recurrence
 from fogml.blind.frame.record import EARTH_DEG_H, World
 
 

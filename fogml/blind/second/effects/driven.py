@@ -6,9 +6,8 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Demands, Shape
-from fogml.blind.frame.operators import late
+from fogml.blind.frame.operators import late, preisach
 from fogml.blind.frame.record import World
-from fogml.blind.second.memory import preisach
 
 
 class PolarisationBeats(Additive):

@@ -6,9 +6,8 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Demands, ScaleFactor, Shape
-from fogml.blind.frame.operators import faded, late
+from fogml.blind.frame.operators import bouc_wen_general, faded, late, maxwell_slip, preisach, slab_lag
 from fogml.blind.frame.record import World
-from fogml.blind.second.memory import bouc_wen_general, maxwell_slip, preisach, slab_lag
 
 _CLUSTER = 12
 

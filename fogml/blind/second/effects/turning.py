@@ -8,9 +8,8 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Sensing, Shape
-from fogml.blind.frame.operators import late
+from fogml.blind.frame.operators import backlash, late, slab_lag
 from fogml.blind.frame.record import EARTH_DEG_H, World
-from fogml.blind.second.memory import backlash, slab_lag
 
 
 class SourceOwnHeat(ScaleFactor):

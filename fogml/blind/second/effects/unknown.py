@@ -7,9 +7,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Demands, Shape
-from fogml.blind.frame.operators import late
+from fogml.blind.frame.operators import backlash, late, preisach
 from fogml.blind.frame.record import World
-from fogml.blind.second.memory import backlash, preisach
 
 
 class ThresholdSteps(Additive):

@@ -7,9 +7,8 @@ from scipy.special import expit
 
 from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Additive, Demands, Shape
-from fogml.blind.frame.operators import late
+from fogml.blind.frame.operators import backlash, late
 from fogml.blind.frame.record import World
-from fogml.blind.second.memory import backlash
 from fogml.blind.second.plant import AXIAL, RADIAL
 
 _C_T = 0.6
