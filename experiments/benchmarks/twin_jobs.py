@@ -177,7 +177,7 @@ def _replay(quick: bool, folder: Path) -> Work:
 
 def _flicker(quick: bool, folder: Path) -> Work:
     from fogml.signals.allan import allan_deviation
-    from fogml.signals.flicker import Flicker
+    from fogml.signals.random_noise import Flicker
 
     count = 100_000 if quick else 10_000_000
 
@@ -274,7 +274,7 @@ TWIN_JOBS: tuple[Job, ...] = (
     Job(
         "flicker",
         "flicker noise, 10,000,000 samples",
-        "fogml.signals.flicker",
+        "fogml.signals.random_noise",
         "colorednoise.powerlaw_psd_gaussian",
         _flicker,
     ),

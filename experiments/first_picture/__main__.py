@@ -12,8 +12,8 @@ import numpy as np
 import fogml
 from fogml.arrays import FloatArray
 from fogml.outputs import whole_file
+from fogml.pictures import Curve, line_figure
 from fogml.report import style
-from fogml.static_svg import Curve, line_figure
 
 PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "first-model.svg"
 AXIS, TRAINING_LEG, TEST_LEG = "y", 2, 3

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from fogml.pictures import Curve, line_figure
 from fogml.report import style
-from fogml.static_svg import Curve, line_figure
 
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE)
 DASHES = ("", "6 3", "2 2", "8 3 2 3")

@@ -19,8 +19,8 @@ from fogml.lab.misalignment_json import compare_methods, relative_error_ppm
 from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
 from fogml.outputs import whole_file
+from fogml.pictures import Curve, line_figure
 from fogml.report import style
-from fogml.static_svg import Curve, line_figure
 from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent

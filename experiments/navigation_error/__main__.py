@@ -26,8 +26,8 @@ from fogml.lab.navigation import (
 )
 from fogml.models.names import make_model
 from fogml.outputs import whole_file
+from fogml.pictures import Curve, line_figure
 from fogml.report import style
-from fogml.static_svg import Curve, line_figure
 from fogml.twin.simulate import simulate
 from fogml.validation.judge import judge
 from fogml.yaml_text import read_yaml

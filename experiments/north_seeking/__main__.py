@@ -19,8 +19,8 @@ from fogml.arrays import FloatArray
 from fogml.lab.north import Drift, Scheme, drift_error, horizontal_rate
 from fogml.lab.north_schemes import CoarseFine, Way, quiet_azimuths, seek, ways_of_equal_time, wrapped
 from fogml.outputs import whole_file
+from fogml.pictures import Curve, line_figure
 from fogml.report import style
-from fogml.static_svg import Curve, line_figure
 from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from fogml.pictures import Curve, line_figure
 from fogml.report import style
-from fogml.static_svg import Curve, line_figure
 
 PATENT, OURS, POLYNOMIAL = "RBF, patent's form", "RBF, fogml's", "polynomial"
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY_BLUE)

@@ -278,7 +278,7 @@ def run_oracle(plan: RunPlan, progress: Progress | None = None) -> tuple[int, in
 
 
 def _by_oracle(path: Path, answers: Path, code: str, name: str) -> tuple[str, bool]:
-    from fogml.blind.baselines.oracle import oracle
+    from fogml.blind.baselines.learners import oracle
     from fogml.blind.truth import read_truth
 
     folder = BlindFolder(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 from pydantic import Field
@@ -10,7 +11,10 @@ from fogml.benchmark.rounds import SEED, TRACKS, Track
 from fogml.cli import options
 from fogml.cli.given import argument, option
 from fogml.cli.settings import Settings
-from fogml.errors import InputError
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError, counted
+from fogml.json_files import write_json
+from fogml.outputs import whole_file, whole_folder
 
 
 class RoundSettings(Settings):
@@ -37,7 +41,7 @@ class MakeSettings(RoundSettings):
     The seed of an open round is stated and anyone can make the same; that of a closed one is drawn and kept.
     """
 
-    job: ClassVar[str] = "fogml.cli.benchmark_job:make_and_tell"
+    job: ClassVar[str] = "fogml.cli.benchmark:make_and_tell"
     seed: Annotated[int, option("Seed of an open round; 2026 is the one whose results ship.")] = Field(
         SEED, ge=0, lt=1_000_000
     )
@@ -51,7 +55,7 @@ class MakeSettings(RoundSettings):
 class RunSettings(RoundSettings):
     """Answer the cases that have no answer yet, in sealed processes that see a case's files alone."""
 
-    job: ClassVar[str] = "fogml.cli.benchmark_job:run_and_tell"
+    job: ClassVar[str] = "fogml.cli.benchmark:run_and_tell"
     track: Annotated[Track, option("Which track.", metavar="|".join(TRACKS))] = "drift"
     methods: Annotated[
         list[str],
@@ -76,7 +80,7 @@ class ScoreSettings(RoundSettings):
     Refuses an entry that lacks a case or holds a number that is not finite. Writes score.json and score.html.
     """
 
-    job: ClassVar[str] = "fogml.cli.benchmark_job:score_and_write"
+    job: ClassVar[str] = "fogml.cli.benchmark:score_and_write"
     entries: Annotated[
         list[str], option("Score these alone; may be repeated.", "--entry", metavar="NAME")
     ] = []
@@ -85,6 +89,83 @@ class ScoreSettings(RoundSettings):
         str | None,
         option("Folder for what is written; the round's if none.", "--out", "-o", metavar="DIR", writes=True),
     ] = None
+
+
+def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
+    """Make a round, and say what to hand out."""
+    from fogml.benchmark.make import make_round
+    from fogml.benchmark.score import round_hash
+
+    home = Path(settings.folder())
+    with terminal.work("making a round", total=2) as work:
+        told = make_round(
+            home,
+            seed=settings.seed,
+            closed=settings.closed,
+            drift=settings.drift,
+            diagnosis=settings.diagnosis,
+            real=settings.real,
+            workers=settings.workers,
+            step=lambda words: work.advance(doing=words),
+        )
+    config = settings.in_full().yaml("benchmark make", "make.yaml")
+    with whole_file(home / "kept" / "make.yaml") as partial:
+        partial.write_text(config, encoding="utf-8")
+    counts = {track: len(cases) for track, cases in told["tracks"].items()}
+    terminal.result({"directory": str(home), "round": round_hash(home), **counts})
+    terminal.say(
+        f"{counted(counts['drift'], 'drift case')}, {counted(counts['diagnosis'], 'diagnosis case')}. "
+        f"Hand out {home / 'handout'}, keep {home / 'kept'}; answer: fogml benchmark run {home} --method auto"
+    )
+
+
+def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
+    """Answer a track by each method, and say how many cases failed."""
+    from fogml.benchmark.answers import entry_plan
+    from fogml.blind.run import RunPlan, run_cases
+    from fogml.cli.blind_job import answer
+
+    if not settings.methods:
+        raise InputError("no method is given; name one: --method auto")
+    if len(settings.methods) > 1 and settings.name:
+        raise InputError("--name: the answers of several methods can't have one name")
+
+    def plan_of(method: str) -> RunPlan:
+        return entry_plan(
+            settings.folder(),
+            settings.track,
+            method,
+            name=settings.name,
+            features=settings.features,
+            code=Path(settings.code) if settings.code else None,
+            workers=settings.workers,
+            limit_s=settings.limit,
+            retry=settings.retry,
+            seed=settings.seed,
+        )
+
+    config = settings.in_full().yaml("benchmark run", "run.yaml")
+    answer(settings.methods, plan_of, lambda method: run_cases, config, terminal)
+
+
+def score_and_write(settings: ScoreSettings, terminal: Terminal) -> None:
+    """Score a round, write ``score.json`` and its page."""
+    from fogml.benchmark.score import score_round
+    from fogml.report.benchmark_page import benchmark_page, diagnosis_table, drift_table
+
+    home = Path(settings.folder())
+    with terminal.work("scoring", total=1):
+        values = score_round(home, settings.entries, workers=settings.workers)
+    out = Path(settings.out) if settings.out else home
+    with whole_folder(out, shared=True) as staging:
+        write_json(staging / "score.json", values, indent=1)
+        (staging / "score.html").write_text(benchmark_page(values), encoding="utf-8")
+        settings.write_into(staging, "benchmark score")
+    for table in (drift_table(values), diagnosis_table(values)):
+        if table is not None:
+            terminal.table(table.caption, [c[0] for c in table.columns], [r.cells for r in table.rows])
+    terminal.result(values)
+    terminal.say(f"Written to {out}: open {out / 'score.html'}")
 
 
 COMMANDS = {"make": MakeSettings, "run": RunSettings, "score": ScoreSettings}

@@ -116,7 +116,7 @@ def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
 
 
 def _print_pictures(id: str, terminal: Terminal) -> None:
-    from fogml.static_svg import braille
+    from fogml.pictures import braille
     from fogml.twin.pictures import pictures
 
     declared = effect(id)

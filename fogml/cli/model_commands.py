@@ -103,7 +103,7 @@ class CompensateSettings(Settings):
     memory not settled (there what the run tells of it).
     """
 
-    job: ClassVar[str] = "fogml.cli.compensate_job:compensate_and_write"
+    job: ClassVar[str] = "fogml.cli.model_jobs:compensate_and_write"
     run: Annotated[
         str | None,
         argument("RUN", "The run to compensate.", reads=True, known=options.SHIPPED_RUNS),
@@ -136,7 +136,7 @@ class ExportJobSettings(Settings):
     ardupilot are parameter files with a cubic. Both hold what the model says at rest.
     """
 
-    job: ClassVar[str] = "fogml.cli.export_job:export_and_write"
+    job: ClassVar[str] = "fogml.cli.model_jobs:export_and_write"
     model: Annotated[
         list[str],
         BeforeValidator(_several),

@@ -18,9 +18,9 @@ from fogml.runs.columns import header
 from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
+from fogml.validation.floors import floors_over, settling_warning
 from fogml.validation.inspection import inspection_json
 from fogml.validation.limits import hold_strict
-from fogml.validation.settling import settling_warning
 
 _FIRST_ROWS = 5
 
@@ -235,7 +235,6 @@ def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
 def _floor(run: Run, taus_s: Sequence[float]) -> dict[str, Any] | None:
     """The noise floor as drift models are held against, from their usual averaging time on."""
     from fogml.signals.averages import AVERAGING_S
-    from fogml.validation.floors import floors_over
 
     longest = 0.5 * run.span_s
     times = [AVERAGING_S, *(tau for tau in taus_s if AVERAGING_S < tau <= longest)]

@@ -16,8 +16,8 @@ from fogml.errors import InputError
 from fogml.json_files import check_finite
 from fogml.runs.columns import REPLAYED
 from fogml.runs.facts import facts_from
+from fogml.runs.other_rate import at_times_of, is_simulator_output, read_gnss_ins_sim
 from fogml.runs.run import Run
-from fogml.runs.simulated_output import at_times_of, is_simulator_output, read_gnss_ins_sim
 from fogml.runs.writing import BlockWriter, carried_cells, header_cells
 from fogml.twin.draws import drawn_twin
 from fogml.twin.programme import load_programme

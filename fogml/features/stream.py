@@ -15,8 +15,14 @@ from fogml.features.features import Features
 from fogml.features.signal import TIME_ON, Signal
 from fogml.runs.columns import is_temperature
 from fogml.runs.dropouts import ThermometerStream, Told
-from fogml.signals import window_streams
 from fogml.signals.kernel_windows import KernelStream
+from fogml.signals.memory import (
+    BlockDifferenceStream,
+    ExponentialStream,
+    FirstDifferenceStream,
+    SlopeStream,
+    WindowStream,
+)
 
 
 class StreamStep(NamedTuple):
@@ -187,14 +193,14 @@ def _operator_key(atom: Atom) -> tuple[Signal, Window, float | None] | None:
     return atom.signal, atom.window, None if atom.operator == "diff" else RATE_UNIT_S
 
 
-def _operator(window: Window, sample_s: float, unit_s: float | None) -> window_streams.WindowStream:
+def _operator(window: Window, sample_s: float, unit_s: float | None) -> WindowStream:
     if window.method == "first":
-        return window_streams.FirstDifferenceStream(sample_s, unit_s)
+        return FirstDifferenceStream(sample_s, unit_s)
     if (own := window.own) is not None:
         return KernelStream(window.length_s, sample_s, window.length_s if unit_s is None else unit_s, own)
-    kinds: dict[str, Callable[[float, float, float | None], window_streams.WindowStream]] = {
-        "block": window_streams.BlockDifferenceStream,
-        "slope": window_streams.SlopeStream,
-        "exp": window_streams.ExponentialStream,
+    kinds: dict[str, Callable[[float, float, float | None], WindowStream]] = {
+        "block": BlockDifferenceStream,
+        "slope": SlopeStream,
+        "exp": ExponentialStream,
     }
     return kinds[window.method](window.length_s, sample_s, unit_s)

@@ -24,8 +24,8 @@ from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.grammar import parse_terms
 from fogml.features.signal import check_holds
-from fogml.features.suits import unsuited
 from fogml.features.terms import Term
+from fogml.models.box import unsuited
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import linear_regressor
@@ -33,8 +33,8 @@ from fogml.models.row_noise import noise_of_rows, stretches_of
 from fogml.models.table import RunRows, TrainingTable, table_of_rows
 from fogml.numerals import short
 from fogml.runs.run import Run
-from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
+from fogml.signals.random_noise import LONGEST_S
 from fogml.signals.whitening import Whitener
 
 LENGTHS: tuple[float, ...] = (0.1, *np.geomspace(1.0, 1000.0, 13).tolist())

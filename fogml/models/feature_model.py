@@ -20,9 +20,8 @@ from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.signal import check_holds
 from fogml.features.stream import FeatureStream
-from fogml.features.suits import check_suits
 from fogml.models.base import DriftModel, Evaluation
-from fogml.models.box import distance_outside, learn_box
+from fogml.models.box import check_suits, distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.compact import Compact, compact_regressor
 from fogml.models.folds import dealt_folds

@@ -17,8 +17,8 @@ from fogml.arrays import FloatArray
 from fogml.models.row_noise import noise_of_rows
 from fogml.models.table import TrainingTable
 from fogml.processes import one_thread
-from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import Ladder, NoiseModel, flicker_ladder
+from fogml.signals.random_noise import LONGEST_S
 from fogml.signals.whitening import Whitener
 
 

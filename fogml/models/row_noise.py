@@ -16,10 +16,10 @@ from fogml.arrays import FloatArray
 from fogml.models.linear import LinearRegressor
 from fogml.models.table import Compose, RunRows, TrainingTable, averaged_table, recorded_s
 from fogml.processes import one_thread
-from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 from fogml.signals.output_filters import SpectrumTerms, term_shapes
+from fogml.signals.random_noise import LONGEST_S
 from fogml.signals.restricted import absent_or_not, weighed_models
 from fogml.signals.whitening import Whitener
 
@@ -211,7 +211,8 @@ def noise_covariance(
     Notes
     -----
     What else moves a run as a whole from one to the next is no part of it. Flicker slower than the run moves
-    its constant in one piece, which no run shows: it is taken to go on to `fogml.signals.flicker.LONGEST_S`.
+    its constant in one piece, which no run shows: it is taken to go on to
+    `fogml.signals.random_noise.LONGEST_S`.
     """
     if averaging_s is None:
         averaging_s = 0.0 if sum(len(part.y) for part in rows) <= ROWS else recorded_s(rows) / ROWS

@@ -69,7 +69,7 @@ READERS = (
     Reader("mdf", "MDF4", (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), f"{_TABLES}:Mdf", "asammdf", "mdf",
            1.0),
     Reader("miniseed", "miniSEED", (".mseed", ".miniseed", ".ms"), (b"MS\x03",),
-           "fogml.readers.seismic:MiniSeed", "pymseed", "miniseed"),
+           f"{_VEHICLES}:MiniSeed", "pymseed", "miniseed"),
     Reader("ulog", "ULog", (".ulg", ".ulog"), (b"ULog\x01\x12\x35",), f"{_VEHICLES}:ULog", "pyulog", "ulog",
            2.0),
     Reader("dataflash", "DataFlash", (".bin",), (b"\xa3\x95\x80\x80",), f"{_VEHICLES}:DataFlash",

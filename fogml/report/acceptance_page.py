@@ -9,11 +9,11 @@ import numpy as np
 from markupsafe import Markup
 
 from fogml.numerals import short
+from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table, columns_of
 from fogml.report.words import MISSING, listed, number, percent, plural, stated
-from fogml.static_svg import Curve, line_figure
 
 VERDICTS = {
     "accepted": ("met", "✓", "Accepted"),

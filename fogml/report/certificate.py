@@ -10,6 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fogml.numerals import short
+from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import render
 from fogml.report.style import time_unit
@@ -25,7 +26,6 @@ from fogml.report.verdict import (
 )
 from fogml.report.words import averages, listed, number, percent, unit_of
 from fogml.signals.drawn import drawn
-from fogml.static_svg import Curve, line_figure
 from fogml.validation.advice import advice_on
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement

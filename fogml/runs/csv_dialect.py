@@ -11,8 +11,7 @@ from pathlib import Path
 from fogml.errors import InputError, printable
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.csv_header import fields_of, header_over_lines
-from fogml.runs.csv_numbers import Marks, marks_of, number
-from fogml.runs.csv_source import CsvSource, csv_source
+from fogml.runs.csv_source import CsvSource, Marks, csv_source, marks_of, number
 from fogml.runs.header_spelling import DATE_NAMES
 from fogml.runs.raw_table import empty_file, wanted_cells
 from fogml.runs.stamps import FRACTION, StampForm, Stamps, stamps_of

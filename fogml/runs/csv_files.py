@@ -19,7 +19,7 @@ from fogml.arrow_arrays import values_of
 from fogml.errors import InputError
 from fogml.runs.csv_dialect import CsvDialect, csv_dialect
 from fogml.runs.csv_lines import LineReader, cut_error, cut_line, line_of_row, note_of_end, without_footer
-from fogml.runs.csv_numbers import MISSING
+from fogml.runs.csv_source import MISSING
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
 from fogml.runs.stamps import StampClock

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError, counted, quoted
 from fogml.runs.csv_dialect import CsvDialect
 from fogml.runs.csv_header import fields_of
-from fogml.runs.csv_numbers import number
-from fogml.runs.csv_source import CsvSource
+from fogml.runs.csv_source import CsvSource, number
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
 from fogml.runs.stamps import StampClock

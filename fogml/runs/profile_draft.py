@@ -16,8 +16,7 @@ from fogml.runs.columns import column_spec, is_accepted, parse_header
 from fogml.runs.container_files import groups_of
 from fogml.runs.csv_dialect import decoded_head
 from fogml.runs.csv_header import fields_of, is_number_like, labview_header
-from fogml.runs.csv_numbers import PLAIN, Marks, marks_of, number
-from fogml.runs.csv_source import CsvSource
+from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
 from fogml.runs.header_spelling import canonical_cells, face_of, with_units_below
 from fogml.runs.opening import opened
 from fogml.runs.profile_parts import SEPARATORS

@@ -138,7 +138,7 @@ class NoiseSource:
         self._angle = float(self._rng["Q"].uniform(-0.5, 0.5)) if constants.Q > 0.0 else 0.0
         self._flicker = None
         if constants.B > 0.0:
-            from fogml.signals.flicker import Flicker
+            from fogml.signals.random_noise import Flicker
 
             self._flicker = Flicker(constants.B, sample_s, self._rng["B"])
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from fogml.blind.baselines.learners import abstain, gp_discrepancy
-from fogml.blind.baselines.oracle import oracle
+from fogml.blind.baselines.learners import abstain, gp_discrepancy, oracle
 from fogml.blind.baselines.regression import bic, bic_fixed_nominal
 from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.methods import METHODS, load_method

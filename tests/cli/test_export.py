@@ -8,7 +8,7 @@ import shutil
 import pytest
 import yaml
 
-from fogml.cli.export_job import ExportJobSettings, _print
+from fogml.cli.model_jobs import ExportJobSettings, _print_export
 from fogml.cli.terminal import Terminal
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
@@ -59,7 +59,7 @@ def test_bytes_that_hold_little_of_the_model_are_told(invoke_json, model, tmp_pa
     report = invoke_json("export", model, "--to", "json", "--bytes", "16", "-o", out)
     for share, told in ((0.4, False), (0.6, True)):
         report["pruning"]["rms_difference"] = share * report["pruning"]["model_deviation"]
-        _print(ExportJobSettings(model=[str(model)], out=str(out)), report, Terminal())
+        _print_export(ExportJobSettings(model=[str(model)], out=str(out)), report, Terminal())
         assert ("or prune on its training runs (--train)" in capsys.readouterr().err) == told
 
 

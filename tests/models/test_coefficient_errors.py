@@ -11,7 +11,7 @@ from fogml.models.row_noise import noise_covariance, stretches_of
 from fogml.models.table import RunRows, TrainingTable
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-from fogml.signals.flicker import Flicker
+from fogml.signals.random_noise import Flicker
 
 N, STEP_S, REPEATS = 3000, 5.0, 30
 TIME = STEP_S * np.arange(N)

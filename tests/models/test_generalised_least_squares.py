@@ -13,8 +13,8 @@ from fogml.models.generalised_least_squares import (
     shifted,
 )
 from fogml.models.table import TrainingTable
-from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
+from fogml.signals.random_noise import LONGEST_S
 
 STEP_S = 60.0
 

@@ -10,8 +10,8 @@ from fogml.models.folds import time_folds
 from fogml.models.row_noise import RowNoise
 from fogml.models.table import TrainingTable
 from fogml.models.unseen_noise import NONE, Unseen, unseen_noises
-from fogml.signals.flicker import LONGEST_S
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
+from fogml.signals.random_noise import LONGEST_S
 
 STEP_S = 100.0
 SQUARES = np.array([[4.0, 0.0, 0.0], [4.0, 1e-3, 0.0], [4.0, 1e-3, 1e-6]])

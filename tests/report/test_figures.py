@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 import pytest
 from scipy.stats import chi2
 
+from fogml.pictures import Curve, line_figure
 from fogml.report.compare_page import residuals_in_time, rms_bars
 from fogml.report.figures_gap import _parted
 from fogml.report.figures_gap_evidence import variance_ratios
@@ -28,7 +29,6 @@ from fogml.report.page import Drawing
 from fogml.report.plan_page import programme_drawing
 from fogml.report.style import segments_of, shade
 from fogml.runs.run import Run
-from fogml.static_svg import Curve, line_figure
 from tests.report.judgements import FLOOR, judged_run, judgement
 
 

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fogml.pictures import braille, ticks
 from fogml.report import words
 from fogml.report.style import log_axis, rounded_up, time_unit
 from fogml.report.tables import Table, coefficients_table
-from fogml.static_svg import braille, ticks
 
 
 @pytest.mark.parametrize(

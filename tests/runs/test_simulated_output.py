@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.runs.other_rate import at_times_of, is_simulator_output, read_gnss_ins_sim
 from fogml.runs.reading import read_run
 from fogml.runs.run import Run
-from fogml.runs.simulated_output import at_times_of, is_simulator_output, read_gnss_ins_sim
 from tests.cli.conftest import run_program
 
 

@@ -6,10 +6,10 @@ from scipy.signal import butter, lfilter
 
 from fogml.signals.allan import segment_bounds
 from fogml.signals.averages import FastNoise, averages_variance
-from fogml.signals.flicker import Flicker
 from fogml.signals.floor import Floor, floor_model, quiet_parts
 from fogml.signals.noise_expectation import floor_square
 from fogml.signals.noise_model import NoiseModel
+from fogml.signals.random_noise import Flicker
 
 HOURS_10 = np.arange(36_000.0)
 

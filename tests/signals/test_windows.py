@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.signals import window_streams as streams
+from fogml.signals import memory as streams
 from fogml.signals.clock import Clock, gap_starts
 from fogml.signals.windows import block_difference, exponential, first_difference, slope
 

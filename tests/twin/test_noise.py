@@ -7,7 +7,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.signals.allan import allan_deviation
-from fogml.signals.flicker import Flicker
+from fogml.signals.random_noise import Flicker
 from fogml.twin.noise import NoiseConstants, NoiseSource
 from tests.twin.allan import allan_variance
 

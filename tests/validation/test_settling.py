@@ -6,7 +6,7 @@ import numpy as np
 
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
-from fogml.validation.settling import settling_warning
+from fogml.validation.floors import settling_warning
 
 
 def static(seed: int, warm_deg_h: float = 0.0, tau_s: float = 1.0, step_s: float = 4.0) -> Run:

@@ -16,7 +16,7 @@ from fogml.blind.frame.operators import late
 from fogml.blind.frame.record import Course, SetUp, World
 from fogml.blind.frame.thermometers import draw_instruments, quick_enough, sense
 from fogml.blind.frame.unit import Reality, Unit, UnitRun
-from fogml.blind.third.effects import driven, unknown, winding
+from fogml.blind.third.effects import driven, winding
 from fogml.blind.third.plant import NAMES, Plant, draw_plant
 
 Turns = tuple[tuple[float, float, float], ...]
@@ -276,6 +276,6 @@ def draw_unit(
 
 KNOWN = forms_in(winding, driven)
 """Forms of effects that a gyro's physics knows by name; those of supply, field and rig stand elsewhere."""
-INVENTED = forms_in(unknown, known=False)
+INVENTED = forms_in(driven, known=False)
 """Effects that no library holds."""
 REALITY = Reality("third", KNOWN, INVENTED, winding.OtherInside, draw_unit)
