@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from fogml.arrays import FloatArray
-from fogml.gap.cards import Card
+from fogml.gap.fitted_model import Fit
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.model import within_limits
@@ -32,17 +31,16 @@ NOT_LINEAR = ("line", "power_cycles", "sensor_steps", "clock_skew")
 """Families that no size moves alone: of a phase of their own, or not in proportion to their size."""
 
 
-def counterfactuals(
-    found: Inference, after: Foretold, named: Sequence[Cause], cards: Mapping[str, Card]
-) -> tuple[Counterfactual, ...]:
+def counterfactuals(found: Inference, fit: Fit, named: Sequence[Cause]) -> tuple[Counterfactual, ...]:
     """Every run with courses of what is named, of what the twin has, and of others at their usual size."""
     settings, told = found.setting.priors.reported, []
+    sizes = {effect.id: effect.amplitude for effect in fit.effects}
     for i, rows in enumerate(found.scene.runs):
         windows = averages(rows, settings.averaging_s)
-        courses = [c for c in _courses(found, after, named, cards, i) if np.isfinite(c.values).all()]
+        courses = [c for c in _courses(found, fit.foretold, named, sizes, i) if np.isfinite(c.values).all()]
         acting = np.sum([c.values for c in courses if c.acts], axis=0) if courses else 0.0
         # What is replayed in all, less what acts: the twin's own effects are part of its replay.
-        whole = rows.recorded - rows.gap + after.on(i)
+        whole = rows.recorded - rows.gap + fit.foretold.on(i)
         floor = float(floor_square(found.field.whitening.noise, windows.time, windows.window_s)) ** 0.5
         averaged = [replace(c, values=windows.of(c.values)) for c in courses]
         least = settings.shown_share * floor
@@ -63,7 +61,7 @@ def counterfactuals(
 
 
 def _courses(
-    found: Inference, after: Foretold, named: Sequence[Cause], cards: Mapping[str, Card], run: int
+    found: Inference, after: Foretold, named: Sequence[Cause], sizes: Mapping[str, float], run: int
 ) -> list[Course]:
     scene, values = found.scene, found.setting.values
     rows = scene.runs[run]
@@ -74,15 +72,12 @@ def _courses(
         acts = id in by_id or id in on
         if not acts and not _linear(declared):
             continue
-        course: FloatArray = np.zeros(len(rows))
-        size = 0.0
         if id in by_id:
-            size = cards[id].value.amplitude
-            course = course + np.sum([after.of_member(run, m) for m in by_id[id].members], axis=0)
-        if id in on:
-            course = course + rows.made(declared, on[id].amplitude, on[id].shape, values)
-            size += on[id].amplitude
-        if not acts:
+            size, course = sizes[id], after.of_cause(run, by_id[id])
+        elif id in on:
+            size = on[id].amplitude
+            course = rows.made(declared, size, on[id].shape, values)
+        else:
             size = declared.amplitude.typical(scene.grade)
             course = rows.made(declared, size, declared.default_shape(scene.grade), values)
         courses.append(Course(id, size, declared.amplitude.unit, acts, declared.amplitude.signed, course))

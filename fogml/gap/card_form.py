@@ -114,8 +114,8 @@ class Form:
         scene = field.setting.scene
         self.declared, self.field = declared, field
         self.shape = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
-        self.driving = [
-            None if place is None else driving_of(declared, rows, scene, place) for rows in scene.fit
+        self._driving = [
+            None if place is None else driving_of(declared, rows, scene, place) for rows in scene.runs
         ]
         unknowns = [_Unknown(q, scene.grade) for q in declared.shape if not is_whole(q, scene.grids)]
         self.free = [one for one in unknowns if one.free]
@@ -129,14 +129,24 @@ class Form:
 
     def made(self, unknowns: FloatArray) -> FloatArray:
         """Whitened, shape (n,)."""
-        return np.asarray(unknowns[0] * self._usual(unknowns))
+        return self.field.whitening.stacked([self.on(run, unknowns) for run in self._fitted])
 
     def slopes(self, unknowns: FloatArray) -> FloatArray:
-        """Of what is made, shape (n, unknowns), by central differences where it is not in proportion."""
+        """Of what is made, whitened, shape (n, unknowns)."""
+        return self.field.whitening.stacked([self.slopes_on(run, unknowns) for run in self._fitted])
+
+    def on(self, run: int, unknowns: FloatArray) -> FloatArray:
+        """What is made of a run of the scene [deg/h], shape (m,)."""
+        return np.asarray(unknowns[0] * self._usual(run, unknowns))
+
+    def slopes_on(self, run: int, unknowns: FloatArray) -> FloatArray:
+        """Of what is made of a run, shape (m, unknowns), by central differences where not in proportion."""
         moves = _MOVE * np.eye(len(unknowns))
-        own = [self._usual(unknowns)] if self.declared.in_proportion else []
-        differences = [self.made(unknowns + move) - self.made(unknowns - move) for move in moves[len(own) :]]
-        return np.column_stack([*own, *(difference / (2.0 * _MOVE) for difference in differences)])
+        columns = [self._usual(run, unknowns)] if self.declared.in_proportion else []
+        for move in moves[len(columns) :]:
+            above, below = self.on(run, unknowns + move), self.on(run, unknowns - move)
+            columns.append((above - below) / (2.0 * _MOVE))
+        return np.column_stack(columns)
 
     def told(self, unknowns: FloatArray, errors: FloatArray) -> Fitted:
         """What unknowns stand for."""
@@ -161,12 +171,16 @@ class Form:
         own = {u.quantity.name: u.value(x) for u, x in zip(self.free, unknowns[1:].tolist())}
         return {**self.shape, **own}
 
-    def _usual(self, unknowns: FloatArray) -> FloatArray:
+    @property
+    def _fitted(self) -> range:
+        return range(self.field.setting.scene.fitted)
+
+    def _usual(self, run: int, unknowns: FloatArray) -> FloatArray:
         """Over the amplitude, times its usual most."""
-        runs, values = self.field.setting.scene.fit, self.field.setting.values
-        shape = at_amplitude(self.declared, self.usual * float(unknowns[0]), self._shape(unknowns))
-        by_run = [r.response(self.declared, shape, t, values) for r, t in zip(runs, self.driving)]
-        return self.usual * self.field.whitening.stacked(by_run)
+        setting, amplitude = self.field.setting, self.usual * float(unknowns[0])
+        shape = at_amplitude(self.declared, amplitude, self._shape(unknowns))
+        rows, driving = setting.scene.runs[run], self._driving[run]
+        return self.usual * rows.response(self.declared, shape, driving, setting.values)
 
 
 class Root:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from fogml.arrays import FloatArray
 from fogml.gap.card_form import Fitted, Form, Optimum, Root, optimum
 from fogml.gap.catalogue import nodes_of, signature_of
 from fogml.gap.field import Field, Member, apart
@@ -22,6 +21,7 @@ from fogml.gap.rows import Rows
 from fogml.gap.shapes import GridNode, is_angle, is_line
 from fogml.runs.steps import FINEST_STEP_DEGC, WHOLE, recorded_step
 from fogml.twin.effect import Effect
+from fogml.twin.twin import EffectSetting
 
 Start = tuple[str, float, Mapping[str, float]]
 """Name of the place that drives an effect, amplitude and shape."""
@@ -29,40 +29,42 @@ Start = tuple[str, float, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Card:
-    """An effect's amplitude and shape with standard errors."""
+    """An effect's amplitude and shape with standard errors; `had` is what the model has of the amplitude."""
 
     value: EffectValue
     amplitude_se: float
     shape_se: Mapping[str, float]
+    had: float = 0.0
+
+    @property
+    def lacking(self) -> float:
+        """Amplitude that the model has too little."""
+        return self.value.amplitude - self.had
 
 
 def cards_of(found: Inference, judged: Judgement) -> dict[str, Card]:
-    """Each cause's card, by its effect; of one that the model has already what it has too little."""
-    cards, had = {}, {declared.id: setting.amplitude for declared, setting in found.plant.on}
+    """Each cause's card, by its effect: all of it, with what the model has already."""
+    cards = {}
     for cause in judged.causes:
         id = cause.ids[0]
-        if id in had and not found.scene.candidates[id].in_proportion:
-            whole = whole_card(found, judged, cause)
-            value = replace(whole.value, amplitude=whole.value.amplitude - had[id])
-            cards[id] = replace(whole, value=value)
-        else:
-            beside = beside_others(found, judged.best.members, cause)
-            cards[id] = card_of(id, found.field, beside, told_by_family(found, cause))
+        beside = beside_others(found, judged.best.members, cause)
+        had = replaced(found, [id])
+        card = card_of(id, found.field, made_beside(found, beside, had), told_by_family(found, cause))
+        cards[id] = replace(card, had=sum(setting.amplitude for _, setting in had))
     return cards
 
 
-def whole_card(found: Inference, judged: Judgement, cause: Cause) -> Card:
-    """A cause's card of all of it, with what the model has of it already."""
-    id = cause.ids[0]
-    beside = beside_others(found, judged.best.members, cause)
-    data = replace(beside, data=beside.data + made_already(found, id))
-    return card_of(id, found.field, data, told_by_family(found, cause))
+def replaced(found: Inference, ids: Collection[str]) -> tuple[tuple[Effect, EffectSetting], ...]:
+    """What the model has of effects already, in whose place all of each is fitted."""
+    return tuple((declared, setting) for declared, setting in found.plant.on if declared.id in ids)
 
 
-def made_already(found: Inference, id: str) -> FloatArray:
-    """What the model has of an effect already makes of the fit runs, whitened, shape (n,)."""
-    had = (found.field.made(d, held.amplitude, held.shape) for d, held in found.plant.on if d.id == id)
-    return next(had, np.zeros(len(found.field.base.data)))
+def made_beside(
+    found: Inference, beside: LinearGaussian, had: Sequence[tuple[Effect, EffectSetting]]
+) -> LinearGaussian:
+    """Data with what effects make that the model has already."""
+    made = [found.field.made(declared, setting.amplitude, setting.shape) for declared, setting in had]
+    return replace(beside, data=beside.data + np.sum(made, axis=0)) if made else beside
 
 
 def beside_others(found: Inference, members: Sequence[Member], cause: Cause) -> LinearGaussian:
@@ -175,6 +177,9 @@ def _starts(declared: Effect, field: Field, beside: LinearGaussian, told: Mappin
         tried.append((gain, (str(block.shape["place"]), size, shape)))
     tried.sort(key=lambda one: -one[0])
     starts = [start for _, start in tried[: reported.card_starts]]
+    # What is not in proportion to its amplitude fits well next to no amplitude but its own.
+    usual_shape = declared.default_shape(scene.grade)
+    starts += [(starts[0][0], amplitude, usual_shape) for amplitude in declared.amplitudes]
     # The opposite direction of the opposite sign is another answer where a part does not turn.
     place, size, shape = starts[0]
     both = angles and declared.amplitude.signed

@@ -27,13 +27,13 @@ def found_cause(
     scene, settings = found.scene, found.setting.priors.reported
     declared = scene.candidates[cause.ids[0]]
     _, high = declared.amplitude.range(scene.grade)
-    by_run = _by_run(found, cause, card.value.amplitude)
+    by_run = _by_run(found, cause, card.lacking)
     return Found(
         effect=cause.ids[0],
         stage=declared.stage,
         members=cause.ids,
         probability=probability,
-        amplitude=Estimate(card.value.amplitude, card.amplitude_se, declared.amplitude.unit),
+        amplitude=Estimate(card.lacking, card.amplitude_se, declared.amplitude.unit),
         parameters={
             q.name: Estimate(card.value.shape[q.name], card.shape_se.get(q.name, 0.0), q.unit)
             for q in declared.shape
@@ -45,7 +45,7 @@ def found_cause(
         onset=onset(found, every, cause),
         share=share,
         place=declared.place,
-        times_usual=abs(card.value.amplitude) / high,
+        times_usual=abs(card.lacking) / high,
         log_odds=(cause.odds, cause.within, cause.log_share),
         left_out=cause.left_out if probability >= NAMED else (),
     )

@@ -9,10 +9,10 @@ import numpy as np
 
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals
-from fogml.gap.cards import cards_of
+from fogml.gap.cards import Card, cards_of
 from fogml.gap.causes import energy, found_cause
 from fogml.gap.compensation import compensation_of
-from fogml.gap.fitted_model import fitted_model
+from fogml.gap.fitted_model import Fit, fitted_model
 from fogml.gap.how_far import Foretold, HeldOut, cause_shares
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
 from fogml.gap.model import AnyModel, TwinModel
@@ -184,13 +184,13 @@ def _answer(
     scene, settings, likeliest = found.scene, found.setting.priors.reported, judged.best.members
     shifted = [at_cost(c.probability, cost) for c in judged.causes]
     named = [c for c, p in zip(judged.causes, shifted) if p >= NAMED]
+    found, cards, fit = _with_fit(found, judged, named)
+    # As the model that is written replays, which has nothing but what is named.
+    after = fit.foretold
     recalibrated = Foretold.of(found, ())
     every = Foretold.of(found, likeliest)
-    # Beside nothing that nobody would add: two that cancel foretell nothing, one of them left out.
-    after = Foretold.of(found, [m for c in named for m in c.members]) if named else recalibrated
     shares = cause_shares(found, judged, every, recalibrated, seed)
     share = {s.effect: s.share for s in shares if s.run is None and s.regime is None}
-    cards = cards_of(found, judged)
     items = tuple(
         found_cause(found, every, c, p, cards[c.ids[0]], share.get(c.ids[0], 0.0))
         for c, p in zip(judged.causes, shifted)
@@ -212,7 +212,6 @@ def _answer(
     unknown = doubted(Unknown(judged.unknown, looks_like(found, judged)), items)
     verdict = _verdict(named, unknown, judged.nothing < settings.surely_not_nothing)
     shown = () if verdict == "unknown" else items
-    fit = fitted_model(found, judged, named, cards)
     return Diagnosis(
         fit=tuple(r.run.name for r in scene.fit),
         held_out=tuple(r.run.name for r in scene.runs[scene.fitted :]),
@@ -231,7 +230,7 @@ def _answer(
         noise=noise_of(found, after),
         effects=fit.effects,
         uncertainty=fit.uncertainty,
-        counterfactuals=counterfactuals(found, after, named, cards) if courses else (),
+        counterfactuals=counterfactuals(found, fit, named) if courses else (),
         series=series_of(found, recalibrated, after),
         unusable=found.unusable,
         assumed=assumed(found, fit.constants),
@@ -251,6 +250,26 @@ def _answer(
             any(found.kind(m) == "plant" for m in likeliest),
         ),
     )
+
+
+def _with_fit(
+    found: Inference, judged: Judgement, named: Sequence[Cause]
+) -> tuple[Inference, dict[str, Card], Fit]:
+    """Cards and the fit of what is named.
+
+    What acts may look like a constant far off, at which effects would meet the wrong output. Then they are
+    fitted at the constants beside what acts, and at those that were expected, too; what fits best is told.
+    """
+    options = [found]
+    if found.setting.widened:
+        beside = found.setting.values_of(Foretold.of(found, judged.best.members).posterior.mean)
+        expected = {c.name: c.mean for c in found.setting.constants}
+        options += [found.meeting(values) for values in (beside, expected)]
+    told = []
+    for one in options:
+        cards = cards_of(one, judged)
+        told.append((one, cards, fitted_model(one, named, cards)))
+    return max(told, key=lambda option: option[2].closeness)
 
 
 def _verdict(named: Sequence[Cause], unknown: Unknown, something: bool) -> Verdict:

@@ -32,7 +32,7 @@ class Setting:
     fixed
         Responses to one prior standard deviation, shape (m_r, p) for each run; constants first.
     values
-        The constants as fitted beside nothing.
+        The constants at which effects meet the output: as fitted beside nothing, to begin with.
     widened
         Factors on the standard deviations of constants that are far off, by name.
     """
@@ -48,6 +48,11 @@ class Setting:
     def deviations(self) -> FloatArray:
         """Prior standard deviations of the constants, widened ones so, shape (c,)."""
         return np.array([c.sd * self.widened.get(c.name, 1.0) for c in self.constants])
+
+    def values_of(self, coefficients: FloatArray) -> dict[str, float]:
+        """Constants in their units by coefficients, theirs first."""
+        told = zip(self.constants, self.deviations, coefficients)
+        return {c.name: float(c.mean + sd * x) for c, sd, x in told}
 
     @property
     def spans(self) -> tuple[slice, ...]:
@@ -107,10 +112,10 @@ def setting_of(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise
             if i < scene.fitted:
                 wide[:, ends[i] : ends[i + 1]] = errors[i]
             blocks.append(np.concatenate([fixed_columns(setting, i, plant), wide], axis=1))
-        fixed, sd = tuple(blocks), setting.deviations
+        fixed = tuple(blocks)
         whitening = Whitening(noise, setting)
         found = Posterior.of(whitening.stacked(fixed), whitening.stacked([r.gap for r in scene.fit]))
-        values = {c.name: float(c.mean + s * x) for c, s, x in zip(constants, sd, found.mean)}
+        values = setting.values_of(found.mean)
         off = {c.name: abs(values[c.name] - c.mean) / c.sd for c in constants}
         more = {name: 2.0 * z for name, z in off.items() if z > priors.noise.far_off}
         setting = replace(setting, values=values, fixed=fixed, widened={**setting.widened, **more})

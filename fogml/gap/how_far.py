@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.gap.card_form import Form
 from fogml.gap.field import Member
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.noise import white_noise
-from fogml.gap.posterior import Judgement
+from fogml.gap.posterior import Cause, Judgement
 from fogml.gap.result_parts import CauseShare, HowFar
 from fogml.gap.rows import Rows
 from fogml.gap.where import averages
@@ -22,6 +23,8 @@ from fogml.numerals import short
 from fogml.runs.regimes import Regimes
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.effect import Effect
+from fogml.twin.twin import EffectSetting
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +36,20 @@ class Foretold:
     found
         The inference.
     members
-        Causes that are fitted.
+        Causes that are fitted as their families have them.
     posterior
-        Of coefficients: fixed block first, then each member's.
+        Of coefficients: fixed block first, then each member's, then how far each form's unknowns are off.
+    forms
+        Effects that are fitted in their cards' form, by id, and their unknowns.
+    replaced
+        Effects of the model whose place forms and members take.
     """
 
     found: Inference
     members: tuple[Member, ...]
     posterior: Posterior
+    forms: Mapping[str, tuple[Form, FloatArray]] = field(default_factory=dict)
+    replaced: tuple[tuple[Effect, EffectSetting], ...] = ()
 
     @classmethod
     def of(cls, found: Inference, members: Sequence[Member]) -> Foretold:
@@ -49,7 +58,7 @@ class Foretold:
         return cls(found, tuple(members), posterior)
 
     def design(self, run: int) -> FloatArray:
-        """Responses of the coefficients on a run of the scene, shape (m, q) [deg/h]."""
+        """Responses of the coefficients of constants and members on a run of the scene, (m, q) [deg/h]."""
         held = self.found.field
         parts = [self.found.setting.fixed[run]]
         for m in self.members:
@@ -61,14 +70,34 @@ class Foretold:
 
     def on(self, run: int) -> FloatArray:
         """What is foretold [deg/h], shape (m,)."""
-        return np.asarray(self.design(run) @ self.posterior.mean)
+        design, rows = self.design(run), self.found.scene.runs[run]
+        total = np.asarray(design @ self.posterior.mean[: design.shape[1]])
+        for form, unknowns in self.forms.values():
+            total = total + form.on(run, unknowns)
+        for declared, had in self.replaced:
+            total = total - rows.made(declared, had.amplitude, had.shape, self.found.setting.values)
+        return total
+
+    def drawn_on(self, run: int, rng: np.random.Generator) -> FloatArray:
+        """Draws of what is foretold less what is [deg/h], shape (m, draws)."""
+        slopes = [form.slopes_on(run, unknowns) for form, unknowns in self.forms.values()]
+        drawn = self.drawn(rng)
+        off = drawn[:, 1:] - drawn[:, :1]
+        return np.asarray(np.concatenate([self.design(run), *slopes], axis=1) @ off)
+
+    def of_cause(self, run: int, cause: Cause) -> FloatArray:
+        """What one cause makes on a run [deg/h], all of it where the model has some, shape (m,)."""
+        if cause.ids[0] in self.forms:
+            form, unknowns = self.forms[cause.ids[0]]
+            return form.on(run, unknowns)
+        return np.asarray(np.sum([self.of_member(run, m) for m in cause.members], axis=0))
 
     def of_member(self, run: int, member: Member) -> FloatArray:
-        """What one cause makes on a run [deg/h], shape (m,)."""
+        """What one member makes on a run [deg/h], shape (m,)."""
         return self.part(run, member, self.posterior.mean)
 
     def part(self, run: int, member: Member, coefficients: FloatArray) -> FloatArray:
-        """What one cause makes at coefficients of shape (q, ...), shape (m, ...)."""
+        """What one member makes at coefficients of shape (q, ...), shape (m, ...)."""
         at = self.found.field.fixed.shape[1]
         for m in self.members:
             width = self.found.field.block(m.node).shape[1]
@@ -145,8 +174,8 @@ class HeldOut:
     def how_far(self, after: Foretold) -> HowFar:
         """Before, recalibrated, after and floor, and what is closed.
 
-        With nothing but constants, `after` is `recalibrated`. The interval holds errors of coefficients and
-        an uncertain floor.
+        With nothing named, `after` is constants alone. The interval holds errors of what is fitted and an
+        uncertain floor.
         """
         windows, rec, floor = self._windows, self._recalibrated, self._floor
         aft = _square(windows.of(self.rows.gap - after.on(self.run)))
@@ -157,8 +186,8 @@ class HeldOut:
             gap = rec - floor
             closed = (rec - aft) / gap
             moved = np.zeros(draws)
-            if after.members:
-                left = self.rows.gap[:, None] - after.design(self.run) @ after.drawn(self._rng)[:, 1:]
+            if after.members or after.forms:
+                left = (self.rows.gap - after.on(self.run))[:, None] - after.drawn_on(self.run, self._rng)
                 moved = np.array([_square(windows.of(column)) for column in left.T]) - aft
             room = np.maximum(aft - self._rng.choice(self._noises, (draws, draws)), 0.0)
             closing = rec - aft + np.minimum(moved[:, None], room)

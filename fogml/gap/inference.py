@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -116,6 +117,13 @@ class Inference:
     def scene(self) -> Scene:
         """Its runs."""
         return self.setting.scene
+
+    def meeting(self, values: Mapping[str, float]) -> Inference:
+        """The same with effects' forms as they meet the output of other constants."""
+        search, held = copy(self.search), copy(self.field)
+        held.setting = replace(self.setting, values=values)
+        search.field = held
+        return replace(self, setting=held.setting, search=search)
 
     def kind(self, member: Member) -> str:
         """Kind of a member's family."""

@@ -65,18 +65,27 @@ def test_the_twin_that_is_written_replays_as_well_as_is_said(tmp_path, id, ampli
         assert np.sqrt(np.mean(moves**2)) < told.after + 0.05 * told.before
 
 
-@pytest.mark.parametrize(("modelled", "skew"), [(0.0, 60.0), (5.0, 20.0)])
-def test_a_clock_that_is_far_out_is_told_as_far_out(modelled, skew):
-    """Edges that are late by a minute are no multiple of edges late by less."""
+@pytest.mark.parametrize(("modelled", "skew"), [(0.0, 28.0), (5.0, 20.0), (0.0, -50.0)])
+def test_a_clock_that_is_far_out_is_told_as_far_out(tmp_path, modelled, skew):
+    """Edges that are late by more are no multiple of edges late by less, and look like lost scale factor."""
     twin = load_twin("nominal")
-    runs = [
-        simulate(PROGRAMME, twin.with_effect("logger_skew", skew), sample_s=20.0, seed=s).run for s in (1, 2)
+    made = [
+        simulate(PROGRAMME, twin.with_effect("logger_skew", skew), sample_s=20.0, seed=s).run
+        for s in range(3)
     ]
-    found = diagnose(twin.with_effect("logger_skew", modelled) if modelled else twin, runs, plan=False)
+    had = twin.with_effect("logger_skew", modelled) if modelled else twin
+    found = diagnose(had, made[:2], made[2:], plan=False)
     named = found.named[0]
     assert named.effect == "logger_skew"
     assert named.amplitude.value == pytest.approx(skew - modelled, abs=0.5)
     assert found.effects[0].amplitude == pytest.approx(skew, abs=0.05)
+    found.write_model(TwinModel(twin), tmp_path / "twin.yaml")
+    left = made[2].gyro_deg_h - replay(load_twin(tmp_path / "twin.yaml"), made[2])
+    told = found.how_far[0]
+    assert told.after < 2e-3 * told.before
+    assert np.sqrt(np.mean(left**2)) < 2e-3 * np.sqrt(
+        np.mean((made[2].gyro_deg_h - replay(twin, made[2])) ** 2)
+    )
 
 
 def test_a_gap_to_a_twin_is_that_of_the_rows():

@@ -29,7 +29,7 @@ class LoggerSkew(LoggerEffect):
     place = "logger"
     title = "Skew of the logger's clock"
     amplitude = signed("s", (0.1, 60.0), (0.1, 60.0), "A", 1e5)
-    amplitudes = (-200.0, -60.0, -10.0, 0.1, 10.0, 60.0, 200.0)
+    amplitudes = tuple(sorted([0.1, *(sign * 10.0 * 2.0**n for n in range(5) for sign in (-1.0, 1.0))]))
     shape = (shared("growth", "1/h", (0.0, 0.5), "of the skew", (-10.0, 10.0), default=0.0),)
     needs = ("output",)
     sources = ("First-order expansion of a delay",)
