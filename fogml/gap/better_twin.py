@@ -27,7 +27,7 @@ from fogml.twin.plant.fit import PlantFit, fit_plant
 from fogml.twin.registry import effect
 from fogml.twin.twin import Suspected, Twin, Uncertainty
 
-NOT_LINEAR = ("line", "power_cycles", "sensor_steps", "clock_skew")
+NOT_LINEAR = ("line", "power_cycles", "sensor_steps")
 """Families that no size moves alone: of a phase of their own, or not in proportion to their size."""
 
 
