@@ -9,16 +9,15 @@ import numpy as np
 
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals
-from fogml.gap.cards import Card, cards_of
 from fogml.gap.causes import energy, found_cause
 from fogml.gap.compensation import compensation_of
-from fogml.gap.fitted_model import Fit, fitted_model
+from fogml.gap.fitted_model import Explained, explained
 from fogml.gap.how_far import Foretold, HeldOut, cause_shares
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
 from fogml.gap.model import AnyModel, TwinModel
 from fogml.gap.own_simulator import candidates_of
 from fogml.gap.planning.next_run import next_run, rehearse
-from fogml.gap.posterior import Cause, Judgement, at_cost, doubted, judge
+from fogml.gap.posterior import Cause, Judgement, doubted
 from fogml.gap.reports import (
     assumed,
     candidate_evidence,
@@ -160,8 +159,9 @@ def answered(
 ) -> Diagnosis:
     """What is said of a posterior; `part` where the last stretch of the last run was held out."""
     with one_thread():
-        judged = judge(found)
-        answer = _answer(found, judged, noise, part, seed, cost_of_false_name, courses)
+        told = explained(found, cost_of_false_name)
+        found, judged = told.found, told.judged
+        answer = _answer(told, noise, part, seed, courses)
         if plan:
             open_ = answer.verdict in ("unknown", "partly_explained")
             run = next_run(found, judged, answer.found, answer.undetectable, seed, tell, open_)
@@ -172,19 +172,9 @@ def answered(
         return answer
 
 
-def _answer(
-    found: Inference,
-    judged: Judgement,
-    noise: Run | None,
-    part: bool,
-    seed: int,
-    cost: float,
-    courses: bool,
-) -> Diagnosis:
+def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: bool) -> Diagnosis:
+    found, judged, named, cards, fit = told.found, told.judged, told.named, told.cards, told.fit
     scene, settings, likeliest = found.scene, found.setting.priors.reported, judged.best.members
-    shifted = [at_cost(c.probability, cost) for c in judged.causes]
-    named = [c for c, p in zip(judged.causes, shifted) if p >= NAMED]
-    found, cards, fit = _with_fit(found, judged, named)
     # As the model that is written replays, which has nothing but what is named.
     after = fit.foretold
     recalibrated = Foretold.of(found, ())
@@ -193,7 +183,7 @@ def _answer(
     share = {s.effect: s.share for s in shares if s.run is None and s.regime is None}
     items = tuple(
         found_cause(found, every, c, p, cards[c.ids[0]], share.get(c.ids[0], 0.0))
-        for c, p in zip(judged.causes, shifted)
+        for c, p in zip(judged.causes, told.probabilities)
         if p >= settings.listed
     )
     held_out = [
@@ -250,26 +240,6 @@ def _answer(
             any(found.kind(m) == "plant" for m in likeliest),
         ),
     )
-
-
-def _with_fit(
-    found: Inference, judged: Judgement, named: Sequence[Cause]
-) -> tuple[Inference, dict[str, Card], Fit]:
-    """Cards and the fit of what is named.
-
-    What acts may look like a constant far off, at which effects would meet the wrong output. Then they are
-    fitted at the constants beside what acts, and at those that were expected, too; what fits best is told.
-    """
-    options = [found]
-    if found.setting.widened:
-        beside = found.setting.values_of(Foretold.of(found, judged.best.members).posterior.mean)
-        expected = {c.name: c.mean for c in found.setting.constants}
-        options += [found.meeting(values) for values in (beside, expected)]
-    told = []
-    for one in options:
-        cards = cards_of(one, judged)
-        told.append((one, cards, fitted_model(one, named, cards)))
-    return max(told, key=lambda option: option[2].closeness)
 
 
 def _verdict(named: Sequence[Cause], unknown: Unknown, something: bool) -> Verdict:

@@ -9,13 +9,13 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.gap.card_form import Form, Optimum, Root, optimum
-from fogml.gap.cards import Card, in_form, made_beside, replaced
+from fogml.gap.cards import Card, cards_of, in_form, made_beside, replaced
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.model import EffectValue, TwinModel, with_effects
-from fogml.gap.posterior import Cause
-from fogml.gap.result import ConstantFit
+from fogml.gap.posterior import Cause, Judgement, at_cost, judge
+from fogml.gap.result import NAMED, ConstantFit
 from fogml.twin.nominal import NAMES
 from fogml.twin.twin import Uncertainty
 
@@ -41,6 +41,51 @@ class Fit:
     uncertainty: Uncertainty | None
     foretold: Foretold
     closeness: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What is named, with its cards and a model that has it.
+
+    Attributes
+    ----------
+    found, judged
+        The posterior and what is judged by it.
+    probabilities
+        Of its causes, at the cost of a false name.
+    named
+        Those that are surer than not.
+    cards, fit
+        Of each cause, by its effect; of what is named.
+    """
+
+    found: Inference
+    judged: Judgement
+    probabilities: tuple[float, ...]
+    named: tuple[Cause, ...]
+    cards: Mapping[str, Card]
+    fit: Fit
+
+
+def explained(found: Inference, cost: float) -> Explained:
+    """What a posterior names, at a cost of a false name over a missed one.
+
+    What acts may look like a constant far off, at which effects would meet the wrong output. Then they are
+    fitted at the constants beside what acts, and at those that were expected, too; what fits best is told.
+    """
+    judged = judge(found)
+    probabilities = tuple(at_cost(c.probability, cost) for c in judged.causes)
+    named = tuple(c for c, p in zip(judged.causes, probabilities) if p >= NAMED)
+    options = [found]
+    if found.setting.widened:
+        beside = found.setting.values_of(Foretold.of(found, judged.best.members).posterior.mean)
+        expected = {c.name: c.mean for c in found.setting.constants}
+        options += [found.meeting(values) for values in (beside, expected)]
+    told = []
+    for one in options:
+        cards = cards_of(one, judged)
+        told.append(Explained(one, judged, probabilities, named, cards, fitted_model(one, named, cards)))
+    return max(told, key=lambda option: option.fit.closeness)
 
 
 def fitted_model(found: Inference, named: Sequence[Cause], cards: Mapping[str, Card]) -> Fit:
