@@ -245,13 +245,11 @@ def marks_of(source: CsvSource, rows: Sequence[Sequence[str]], separator: str) -
     Where all that have a mark have three digits behind it, the separator decides: a semicolon and a decimal
     comma go together, as a comma and a decimal point do; and what remains open is said.
     """
-    fields = [field for row in rows for field in row]
-    for mark in ".,":
-        if any(mark in field and _OTHER[mark] in field and _EVIDENT[mark].match(field) for field in fields):
+    held = {mark: [field for row in rows for field in row if mark in field] for mark in ".,"}
+    for mark, other in _OTHER.items():
+        if any(other in field and _EVIDENT[mark].match(field) for field in held[mark]):
             return Marks(mark, True)
-    with_mark = {
-        mark: [field for field in fields if mark in field and _DECIMAL[mark].match(field)] for mark in ".,"
-    }
+    with_mark = {mark: [field for field in held[mark] if _DECIMAL[mark].match(field)] for mark in ".,"}
     in_threes = {
         mark: bool(found) and all(_GROUPS[_OTHER[mark]].match(field) for field in found)
         for mark, found in with_mark.items()
