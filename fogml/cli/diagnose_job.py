@@ -20,6 +20,7 @@ from fogml.gap.result import Diagnosis
 from fogml.gap.units import UnitsDiagnosis, diagnose_units
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
+from fogml.report.words import with_error
 from fogml.runs.columns import REPLAYED
 from fogml.runs.run import Run
 from fogml.twin.twin_file import load_twin
@@ -191,7 +192,7 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
                 f.effect,
                 ", ".join([*f.others, *(f"{m} (left out)" for m in f.left_out)]) or "–",
                 f"{f.probability:.2f}",
-                f"{number(f.amplitude.value)} ± {number(f.amplitude.se)} {f.amplitude.unit}",
+                f"{with_error(f.amplitude.value, f.amplitude.se)} {f.amplitude.unit}",
             ]
             for f in found.found
         ]

@@ -17,7 +17,7 @@ from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows
 from fogml.numerals import short
-from fogml.report.words import duration, to_error
+from fogml.report.words import duration, to_error, with_error
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
@@ -187,7 +187,7 @@ def _print_north(values: dict[str, Any], terminal: Terminal) -> None:
         terminal.say(f"{values['source']}: azimuth {azimuth}{se} deg ({values['method']})")
         drift, drift_se = values["drift_deg_h_per_h"], values["drift_se"]
         if drift is not None:
-            terminal.say(f"linear drift {number(drift)} ± {number(drift_se)} deg/h per h")
+            terminal.say(f"linear drift {with_error(drift, drift_se)} deg/h per h")
             terminal.say(f"a plain seek is off by {number(values['error_deg'])} deg for it")
     else:
         terminal.say(

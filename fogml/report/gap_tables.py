@@ -15,11 +15,10 @@ from fogml.report.gap_words import (
     probability_words,
     title_of,
     unit_words,
-    with_error,
 )
 from fogml.report.style import regime_word
 from fogml.report.tables import Row, Table, columns_of
-from fogml.report.words import MISSING, averages, duration, number, percent
+from fogml.report.words import MISSING, averages, duration, number, percent, with_error
 from fogml.twin.registry import effects
 
 MOST_SEGMENTS = 12

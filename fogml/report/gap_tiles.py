@@ -15,12 +15,11 @@ from fogml.report.gap_words import (
     does_not_close,
     hardest,
     interval_words,
-    probability_words,
     title_of,
     verdict_words,
 )
 from fogml.report.page import Tile
-from fogml.report.words import MISSING, listed, number, percent, plural
+from fogml.report.words import MISSING, listed, number, percent, plural, probability_words
 
 _FAR_UNDER_FLOOR = 0.6
 """Rms over the floor under which the floor is in doubt."""

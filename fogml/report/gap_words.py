@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from fogml.gap.result import Diagnosis, Estimate, Found
 from fogml.gap.result_parts import HowFar
-from fogml.report.words import MISSING, averages, listed, number, plural
+from fogml.report.words import MISSING, averages, listed, number, plural, probability_words, with_error
 from fogml.twin.registry import effects
 
 _UNITS = (("sqrt(h)", "√h"), ("degC2", "°C²"), ("degC", "°C"))
@@ -43,33 +42,9 @@ def title_of(id: str, names: dict[str, str]) -> str:
     return names.get(id, id.replace("_", " ").capitalize())
 
 
-def probability_words(probability: float) -> str:
-    """A probability in whole percent, never as certainty."""
-    if probability < 0.01:
-        return "under 1 %"
-    if probability > 0.99:
-        return "over 99 %"
-    return f"{100 * probability:.0f} %"
-
-
 def estimate_words(value: Estimate) -> str:
     """``0.0210 ± 0.0010 deg/h``: two figures of the standard error decide how many are told."""
     return f"{with_error(value.value, value.se)} {unit_words(value.unit)}".rstrip()
-
-
-def with_error(value: float, se: float) -> str:
-    """A value with its standard error, both to the error's second figure; bare where there is none."""
-    value = 0.0 if abs(value) < 0.005 * se else value
-    if not (math.isfinite(se) and se > 0.0):
-        return number(value)
-    places = 1 - math.floor(math.log10(se))
-    if places < -2 or places > 6:
-        return f"{number(value)} ± {number(se, 2)}"
-    if places <= 0:
-        return f"{value:.0f} ± {se:.0f}".replace("-", "−")
-    told = f"{value:.{places}f}"
-    told = told.removeprefix("-") if float(told) == 0.0 else told
-    return f"{told} ± {se:.{places}f}".replace("-", "−")
 
 
 def interval_words(low: float, high: float) -> str:

@@ -114,6 +114,7 @@ def _environment() -> Environment:
     environment.filters["number"] = words.number
     environment.filters["stated"] = words.stated
     environment.filters["percent"] = words.percent
+    environment.filters["probability"] = words.probability_words
     environment.filters["plural"] = words.plural
     environment.filters["breakable"] = _breakable
     environment.globals["label"] = words.label

@@ -71,6 +71,30 @@ def to_error(value: float, error: float | None, most: int = 4) -> str:
     return f"{value:.{min(decimals, most)}f}".replace("-", "−")
 
 
+def with_error(value: float, se: float) -> str:
+    """A value with its standard error, both to the error's second figure; bare where there is none."""
+    value = 0.0 if abs(value) < 0.005 * se else value
+    if not (math.isfinite(se) and se > 0.0):
+        return number(value)
+    places = 1 - math.floor(math.log10(se))
+    if places < -2 or places > 6:
+        return f"{number(value)} ± {number(se, 2)}"
+    if places <= 0:
+        return f"{value:.0f} ± {se:.0f}".replace("-", "−")
+    told = f"{value:.{places}f}"
+    told = told.removeprefix("-") if float(told) == 0.0 else told
+    return f"{told} ± {se:.{places}f}".replace("-", "−")
+
+
+def probability_words(probability: float) -> str:
+    """A probability in whole percent, never as certainty."""
+    if probability < 0.01:
+        return "under 1 %"
+    if probability > 0.99:
+        return "over 99 %"
+    return f"{100 * probability:.0f} %"
+
+
 def stated(value: float) -> str:
     """A number that somebody stated, such as a limit, as they would write it."""
     return f"{value:.10g}".replace("-", "−")
