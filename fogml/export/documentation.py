@@ -107,7 +107,7 @@ def documentation(model: DriftModel, plan: Plan | None = None) -> str:
         "  0  inside what the model was trained on",
         "  1  outside of it: the value is levelled off",
         "  2  a window is not full or a memory not settled; or a temperature is missing: the last",
-        "     value is held",
+        "     value is held, before any that of the middle of the trained box",
         "",
         "test vectors, windows full and memories settled",
         *_vectors(plan),

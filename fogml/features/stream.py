@@ -93,6 +93,7 @@ class FeatureStream:
         self._sample_s = sample_s
         self._thermometers: dict[str, ThermometerStream] = {}
         self._start()
+        self._held = self._before_any()
 
     def _start(self) -> None:
         """Windows and memories of which nothing is known yet."""
@@ -106,14 +107,21 @@ class FeatureStream:
             for atom in self._features.atoms
             if (memory := atom.memory_operator(self._sample_s)) is not None
         }
-        count = len(self._features.atoms)
-        self._held = StreamStep(np.zeros(len(self._features)), np.zeros(count), False, False, False)
+
+    def _before_any(self) -> StreamStep:
+        """The middle of the learned box, windows empty; zeros where none was learned."""
+        atoms = np.zeros((1, len(self._features.atoms)))
+        if self._judged:
+            for place, atom in enumerate(self._features.atoms):
+                atoms[0, place] = 0.0 if atom.window else np.mean(self._features.box[atom.text])
+        return StreamStep(self._features.compose(atoms)[0], atoms[0], False, False, False)
 
     def step(self, time_s: float, temperatures: Mapping[str, float]) -> StreamStep:
         """Take one sample.
 
         One at which a temperature was not measured (`fogml.runs.dropouts`) is not taken in: what the last
-        measured sample gave is held, its windows not counting.
+        measured sample gave is held, its windows not counting; before any that of the middle of the learned
+        box.
 
         Parameters
         ----------

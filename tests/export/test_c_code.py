@@ -29,7 +29,7 @@ from fogml.export.plan import Plan
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
 from fogml.runs.run import Run
-from tests.export.conftest import NAMES, training_run
+from tests.export.conftest import NAMES, training_run, turning_run
 from tests.models.test_memory_features import made_run
 
 needs_cc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
@@ -220,6 +220,31 @@ def test_no_reading_holds_the_last_drift_and_a_false_first_one_is_replaced(model
     np.testing.assert_array_equal(flag_late[2:150], flag[1:149])
     np.testing.assert_array_equal(flag_late[150:], flag[150:])
     np.testing.assert_array_equal(late[3:], out[3:])
+
+
+@pytest.mark.parametrize("dtype", ["float64", "q31"])
+def test_before_any_reading_the_drift_is_that_of_the_middle_of_the_trained_box(tmp_path, dtype):
+    """In counts of 1/40 deg/h, too: an output is never a count by the name of a rate."""
+    turns = turning_run()
+    counted = Run("turns", turns.columns | {"gyro": np.round(40.0 * turns.gyro)}, turns.facts, "count")
+    model = make_model("joint").fit(counted)
+    plan = Plan.of(model)
+    source = c_source(plan, dtype, [])
+    fixed = source.numbers["fixed"] or {"temperature_value": 1.0, "compensated_value": 1.0}
+    shown = np.full((4, len(plan.sensors)), -127.0)
+    shown[2:] = 20.0
+    program = CProgram(source, tmp_path, flags=QUICK)
+    out, flag = program.steps(
+        2.0 * np.arange(4), np.round(shown / fixed["temperature_value"]), np.full(4, 4e4)
+    )
+    assert flag.tolist() == [2, 2, 2, 2]
+    np.testing.assert_allclose(out * fixed["compensated_value"], 1000.0, atol=2.0)
+    low, high = (np.array(ends) for ends in zip(*(model.features_.box[a.text] for a in plan.atoms)))
+    middle = np.where(plan.windowed, 0.0, 0.5 * (low + high))
+    expected = plan.value(plan.compose(middle[None]), np.array([4e4]))
+    np.testing.assert_allclose(out[:2] * fixed["compensated_value"], expected[0], atol=5e-3)
+    first = model.features_.stream(plan.sample_s, limited=True).step(0.0, dict.fromkeys(plan.sensors, -127.0))
+    np.testing.assert_allclose(plan.value(first.values[None], np.array([4e4])), expected)
 
 
 def test_a_clock_that_steps_back_starts_the_windows_anew(model_of, tmp_path):
