@@ -45,6 +45,7 @@ CASES = {
     "joint, rows dropped, counts of 1 arcsec": Cycle(
         Noise(0.005, 0.01, 0.01, 1.0), "joint", turn_deg_s=10.0, dropped=0.02
     ),
+    "joint, navigation grade, 30 % of rows lost": Cycle(NAVIGATION, "joint", turn_deg_s=10.0, dropped=0.3),
     "joint, short": Cycle(TACTICAL, "joint", turn_deg_s=10.0, soak_s=600.0, ramp_s=300.0),
     "joint, thermometer lags 2 min": Cycle(TACTICAL, "joint", turn_deg_s=10.0, lag_s=120.0),
     "polynomial, tactical": Cycle(TACTICAL, "polynomial", "T^1..2, dT"),
@@ -52,6 +53,7 @@ CASES = {
     "polynomial, thermometer lags 5 min": Cycle(TACTICAL, "polynomial", "T^1..2, dT", lag_s=300.0),
     "polynomial, whole degrees": Cycle(NAVIGATION, "polynomial", "T^1..2, dT", resolution=1.0),
     "four points": Cycle(TACTICAL, "multipoint-2-1"),
+    "four points, 30 % of rows lost": Cycle(TACTICAL, "multipoint-2-1", dropped=0.3),
     "four points, navigation grade": Cycle(NAVIGATION, "multipoint-2-1"),
 }
 

@@ -39,7 +39,7 @@ from fogml.models.folds import dealt_folds
 from fogml.models.intervals import interval_table, out_of_fold_intervals
 from fogml.models.linear import LinearRegressor
 from fogml.models.row_noise import noise_covariance
-from fogml.models.table import RunRows, TrainingTable, row_count
+from fogml.models.table import RunRows, TrainingTable, row_count, without_refilling
 from fogml.models.tall_least_squares import PIECE_ROWS, Part
 from fogml.numerals import number_text
 from fogml.runs.run import Run
@@ -252,14 +252,14 @@ class JointModel(DriftModel):
         return own if self.features is None else own + parse_features(self.features)
 
     def _rows(self, run: Run) -> RunRows:
-        atoms, used, _ = self.features_.atom_values(run)
-        notes = []
+        atoms, full, _ = self.features_.atom_values(run)
+        used, notes = without_refilling(run, self.features_, full)
         if "rate" in run.columns:
             cut = transition_mask(run)
             used = used & ~cut
-            notes = [f"{run.name}: {int(cut.sum())} rows about changes of the table's rate left out"]
+            notes += (f"{run.name}: {int(cut.sum())} rows about changes of the table's rate left out",)
         y = 3600.0 * run.rate if self.patent else run.reference_deg_h
-        return RunRows(np.column_stack((run.gyro, atoms))[used], y[used], run.time[used], tuple(notes))
+        return RunRows(np.column_stack((run.gyro, atoms))[used], y[used], run.time[used], notes)
 
     def _out_of_fold(self, fitted: TrainingTable, held: TrainingTable) -> FloatArray:
         """Rate at rows of output and atoms, of the model fitted to others and limited to their box."""

@@ -87,12 +87,13 @@ def stretches_of(table: TrainingTable) -> tuple[list[slice], float]:
 
 
 def _joined(table: TrainingTable, skipped_share: float) -> tuple[list[slice], float]:
-    """Stretches of three rows or more, those across short gaps as one; and the step [s]."""
+    """Stretches of three rows or more, those across short gaps as one; and the time a row stands for [s]."""
     parts, step_s = stretches_of(table)
     lacking = np.array([_rows_apart(table, *pair, step_s) - 1.0 for pair in pairwise(parts)])
     order = np.argsort(lacking, kind="stable")
     cut = np.ones(len(lacking), dtype=np.bool_)
     cut[order] = np.cumsum(lacking[order]) > skipped_share * len(table)
+    step_s *= 1.0 + float(lacking[~cut].sum()) / len(table)
     starts = [0, *(part.start for part, apart in zip(parts[1:], cut.tolist(), strict=True) if apart)]
     every = [slice(start, stop) for start, stop in pairwise([*starts, len(table)])]
     return [part for part in every if part.stop - part.start >= 3], step_s
@@ -107,7 +108,7 @@ def _rows_apart(table: TrainingTable, last: slice, part: slice, step_s: float) -
 
 
 def noise_of_rows(
-    table: TrainingTable, *, skipped_share: float = 0.05, slowest_corner_hz: float = 1e-5
+    table: TrainingTable, *, skipped_share: float = 1.0, slowest_corner_hz: float = 1e-5
 ) -> RowNoise | None:
     """Noise of a table's values beside its columns and a constant of each stretch; None where they tell none.
 
@@ -117,8 +118,9 @@ def noise_of_rows(
         Rows in time order, run after run.
     skipped_share
         Rows lacking in gaps that are passed over, the shortest first, as a share of those there are. Were a
-        stretch to end with each dropped row or turn of the table, slower noise would not be seen. So white
-        noise stays white, and slow noise is sped up by this share.
+        stretch to end with each dropped row or turn of the table, slower noise would not be seen. Rows stand
+        for the time of those that lack, so that white noise stays white and slow noise is as slow on the
+        whole; that holds as long as more rows are there than lack.
     slowest_corner_hz
         Lowest frequency at which flicker or walk may equal the white noise, however short the rows are [Hz]:
         a day's. Of a gyro it is between 1e-5 and 1e-2 Hz, and minutes of rows are white as a rule.

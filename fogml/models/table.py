@@ -11,10 +11,12 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.models.folds import dealt_blocks
+from fogml.numerals import number_text
 from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
 from fogml.signals.averages import block_averages, window_means
+from fogml.signals.clock import gap_starts, longest_gap_s, needed_s
 
 Compose = Callable[[FloatArray], FloatArray]
 """Gives the columns of a model, shape (m, k), from rows of atom values, shape (m, a)."""
@@ -97,19 +99,60 @@ def training_table(runs: Sequence[Run], features: Features, max_rows: int | None
 def run_rows(run: Run, features: Features) -> RunRows:
     """The rows of a run that models are fitted to.
 
-    Left out are rows whose windows don't count yet, rows about changes of the table's rate, and, where a
-    run both stands and turns, rows at which the table turns: the error there is mostly the scale
-    factor's, 10 ppm of 10 deg/s being 0.36 deg/h, and a drift model does not know the rate.
+    Left out are rows whose windows don't count yet or fill anew after a gap, rows about changes of the
+    table's rate, and, where a run both stands and turns, rows at which the table turns: the error there is
+    mostly the scale factor's, 10 ppm of 10 deg/s being 0.36 deg/h, and a drift model does not know the rate.
     """
     atoms, full, _ = features.atom_values(run)
-    used, notes = usable_rows(run, full)
+    whole, filling = without_refilling(run, features, full)
+    used, notes = usable_rows(run, whole)
     first, stop = _ends(used)
     if used[first:stop].all():
         # All rows but some at the ends: views will do.
         rows: slice | BoolArray = slice(first, stop)
     else:
         rows = used
-    return RunRows(atoms[rows], run.error_deg_h[rows], run.time[rows], notes)
+    return RunRows(atoms[rows], run.error_deg_h[rows], run.time[rows], (*filling, *notes))
+
+
+def without_refilling(
+    run: Run, features: Features, full: BoolArray, *, most: float = 0.5
+) -> tuple[BoolArray, tuple[str, ...]]:
+    """Rows that count, those apart whose windows fill anew after a gap, and what was left out and why.
+
+    A rate that a window tells in part is an error in the columns, which pulls at the rate's coefficient and
+    is in no standard error. What fills at the begin of a run is little beside it, and stays.
+
+    Parameters
+    ----------
+    run
+        The run.
+    features
+        Whose windows.
+    full
+        Where windows hold enough to count, shape (n,).
+    most
+        Share of the rows that count from on which those that fill are kept all the same: there are no others.
+    """
+    edges = np.zeros(len(run) + 1, dtype=np.int64)
+    for window in {atom.window for atom in features.atoms if atom.window is not None}:
+        starts = gap_starts(run.time, run.sample_s, longest_gap_s(window.length_s, run.sample_s))
+        told_s = run.time[starts] + max(needed_s(window.span_s, run.sample_s), 0.0)
+        np.add.at(edges, starts, 1)
+        np.add.at(edges, np.searchsorted(run.time, told_s), -1)
+    filling = full & (np.cumsum(edges[:-1]) > 0)
+    count = int(np.count_nonzero(filling))
+    if count == 0:
+        return full, ()
+    share = count / int(np.count_nonzero(full))
+    told = f"{run.name}: {count} rows in which windows fill anew after gaps"
+    if share > most:
+        return full, (
+            f"{told}, {100.0 * share:.0f} % of all, are in the fit: they pull at coefficients of rates, "
+            f"which no standard error holds; lose fewer samples, or take wider windows than "
+            f"{number_text(max(a.window.length_s for a in features.atoms if a.window is not None))} s",
+        )
+    return full & ~filling, (f"{told} left out",)
 
 
 def _ends(used: BoolArray) -> tuple[int, int]:

@@ -21,7 +21,7 @@ from fogml.models.feature_model import FeatureModel
 from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.names import make_model
 from fogml.models.regressors import parameter_count, weight_bytes
-from fogml.models.table import RunRows, TrainingTable, longest_interval_s, usable_rows
+from fogml.models.table import RunRows, TrainingTable, longest_interval_s, usable_rows, without_refilling
 from fogml.models.trial import averaged_rows, bare_table, held_out_prediction
 from fogml.models.weighing import Weighed
 from fogml.runs.run import Run
@@ -254,5 +254,6 @@ def _rows_of_all(run: Run, texts: Sequence[str]) -> BoolArray:
     """Rows of a run at which every window of feature texts is full."""
     full = np.ones(len(run), dtype=np.bool_)
     for text in texts:
-        full &= parse_features(text).atom_values(run).full
+        features = parse_features(text)
+        full &= without_refilling(run, features, features.atom_values(run).full)[0]
     return usable_rows(run, full)[0]

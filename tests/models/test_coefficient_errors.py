@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.lab_uncertainty.signals import lagged
 from fogml.models.joint import JointModel
 from fogml.models.linear import LinearRegressor
+from fogml.models.names import make_model
 from fogml.models.row_noise import noise_covariance, stretches_of
 from fogml.models.table import RunRows, TrainingTable
 from fogml.runs.facts import Facts
@@ -85,6 +87,42 @@ def test_dropped_rows_hide_no_slow_noise(lost: float) -> None:
         )
         ratios.append(dropped / whole)
     assert np.all(np.abs(np.log(np.median(ratios, axis=0) * (1.0 - lost) ** 0.25)) < 0.2)
+
+
+def test_many_gaps_hide_no_slow_noise() -> None:
+    """Of every 20 rows 5 lack, as where windows fill anew: a walk within 15 rows is hardly seen."""
+    ratios = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        y = COLUMNS @ TRUE[1:] + 0.02 * np.cumsum(rng.normal(size=N)) + rng.normal(size=N)
+        model = LinearRegressor().fit(COLUMNS, y)
+        whole, parted = (
+            np.diag(noise_covariance([RunRows(COLUMNS[k], y[k], TIME[k])], lambda atoms: atoms, model))
+            for k in (slice(None), np.arange(N) % 20 < 15)
+        )
+        ratios.append(np.sqrt(parted / whole))
+    assert np.all(np.abs(np.log(np.median(ratios, axis=0))) < 0.2)
+
+
+@pytest.mark.parametrize(("window", "most"), [("exp", 0.02), ("slope", 0.003)])
+def test_windows_that_fill_anew_after_gaps_do_not_pull_at_coefficients(window: str, most: float) -> None:
+    """Of rows every 4 s 40 % are lost: longer gaps than a quarter of a window come every few minutes."""
+    time = 4.0 * np.arange(6000)
+    chamber = 20.0 + np.interp(time % 7200.0, [0.0, 1200.0, 3600.0, 4800.0, 7200.0], [0, 20, 20, 0, 0])
+    T = lagged(chamber, 4.0, 300.0)
+    drift = 0.01 * T + 0.3 * 60.0 * np.gradient(T, time)
+    kept = np.random.default_rng(0).random(len(time)) >= 0.4
+    run = Run("lossy", {"time": time[kept], "gyro": drift[kept], "T": T[kept]})
+    model = make_model("polynomial", f"T, dT[{window}, 64 s]").fit(run)
+    assert abs(model.regressor_.coef_[1] / 0.3 - 1.0) < most
+    assert "in which windows fill anew after gaps left out" in model.card_.notes[0]
+
+
+def test_where_windows_never_fill_it_is_said_with_what_would_help() -> None:
+    kept = (np.arange(N) % 40 < 16) & (TIME > 200.0)
+    run = Run("parts", {"time": TIME[kept], "gyro": COLUMNS[kept, 2], "T": TEMPERATURE[kept]})
+    notes = make_model("polynomial", "T, dT").fit(run).card_.notes
+    assert "are in the fit" in notes[0] and "wider windows than 64 s" in notes[0]
 
 
 def test_a_run_with_fewer_rows_has_lost_none() -> None:
