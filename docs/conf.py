@@ -7,7 +7,7 @@ from typing import Any
 from docutils import nodes
 
 import fogml
-from fogml.report.manual import mathml
+from fogml.cli.docs_job import mathml
 
 project = "fogml"
 author = "The fogml authors"

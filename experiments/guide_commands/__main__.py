@@ -21,7 +21,7 @@ NEEDS_NETWORK = ("pip ", "python3 -m venv", "make ", "jupyter ")
 
 def pages() -> list[Path]:
     """The README, and the pages in the order of the list on the first."""
-    from fogml.report.manual import page_names
+    from fogml.cli.docs_job import page_names
 
     docs = ROOT / "docs"
     return [ROOT / "README.md", *(docs / f"{name}.md" for name in page_names(docs))]

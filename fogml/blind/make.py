@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from datetime import datetime, timedelta
+from datetime import timedelta
 from functools import partial
 from pathlib import Path
 
@@ -14,7 +14,6 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.blind.folders import BlindFolder, write_sums
 from fogml.blind.frame.form import Form, compatible
-from fogml.blind.frame.record import World
 from fogml.blind.frame.strength import (
     AVERAGING_S,
     Acting,
@@ -123,20 +122,16 @@ def recorded_run(unit: Unit, run: UnitRun, effects: tuple[Acting, ...], plan: Pl
     if "angle" in unit.instruments.others:
         columns["angle"] = np.round(world.angle, _DIGITS)
     heading = unit.set_up.heading
-    known = unit.earth_stated
+    known, first = unit.earth_stated, unit.first_day
     facts = Facts(
         unit=f"BLIND-{plan.name}",
         axis="x",
         latitude=unit.set_up.latitude if known else None,
         input_axis=("up" if heading is None else Heading(heading=heading)) if known else None,
         powered_on=world.programme.powered_on,
-        started=_started(unit, world),
+        started=None if first is None else first + timedelta(seconds=round(world.since_first)),
     )
     return Run(name=run.name, columns=columns, facts=facts)
-
-
-def _started(unit: Unit, world: World) -> datetime | None:
-    return None if unit.first_day is None else unit.first_day + timedelta(seconds=round(world.since_first))
 
 
 def _truth(plan: Plan, seed: int, unit: Unit, reckoning: Reckoning) -> Truth:

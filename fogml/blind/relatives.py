@@ -205,7 +205,11 @@ def measure_forms(
     Cases that were measured before are left as they are. The truths are hashed anew.
     """
     paths = [folder.truth / f"{name}.json" for name in folder.names()]
-    open_ = [path for path in paths if _unmeasured(read_truth(path))]
+    open_ = [
+        path
+        for path in paths
+        if any(effect.id is not None and effect.cosine is None for effect in read_truth(path).effects)
+    ]
     with settled(folder.truth):
         for done, _ in enumerate(in_processes(partial(_measure, folder), open_, workers), 1):
             if progress:
@@ -213,10 +217,6 @@ def measure_forms(
     if open_:
         write_sums(folder.truth)
     return len(open_)
-
-
-def _unmeasured(truth: Truth) -> bool:
-    return any(effect.id is not None and effect.cosine is None for effect in truth.effects)
 
 
 def _measure(folder: BlindFolder, path: Path) -> None:

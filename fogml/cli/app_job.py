@@ -79,7 +79,8 @@ def _form(command: str, settings: type[Settings]) -> dict[str, Any]:
 def _field(settings: type[Settings], key: str, given: Given) -> dict[str, Any]:
     field = settings.model_fields[key]
     annotation = str(field.annotation)
-    choices = [str(choice) for choice in get_args(field.annotation)] if _is_literal(field.annotation) else []
+    is_literal = getattr(field.annotation, "__origin__", None) is Literal
+    choices = [str(choice) for choice in get_args(field.annotation)] if is_literal else []
     kind = "choice" if choices else "switch" if "bool" in annotation else "text"
     if kind == "text" and not given.as_text and ("dict[" in annotation or "list[" in annotation):
         kind = "lines"
@@ -94,10 +95,6 @@ def _field(settings: type[Settings], key: str, given: Given) -> dict[str, Any]:
         "choices": choices,
         "known": [str(name) for name in given.known_names()] if kind == "text" else [],
     }
-
-
-def _is_literal(annotation: Any) -> bool:
-    return getattr(annotation, "__origin__", None) is Literal
 
 
 def words_of(

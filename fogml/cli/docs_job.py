@@ -1,16 +1,142 @@
-"""The job of ``fogml docs``, and its page of every option of every command."""
+"""The job of ``fogml docs``: the pages as one without a network, and one of every option of every command."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import base64
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
+
+import fogml
 from fogml.cli.run_commands import DocsSettings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
+from fogml.escaping import markup
 from fogml.outputs import whole_file
-from fogml.report.manual import manual_folder, manual_page, page_names, page_text, title_of
+from fogml.report.page import render
+
+_MEDIA = {".svg": "image/svg+xml", ".png": "image/png"}
+_FIRST = "index.md"
+"""The page that lists the others, in its fences of ``{toctree}``."""
+
+
+def manual_folder() -> Path:
+    """Where the pages lie: in the checkout, or where the distribution was installed to.
+
+    Raises
+    ------
+    InputError
+        If they are in neither.
+    """
+    checkout = Path(fogml.__file__).parents[1]
+    if (checkout / "docs" / _FIRST).is_file() and (checkout / "pyproject.toml").is_file():
+        return checkout / "docs"
+    try:
+        installed = [Path(str(f.locate())) for f in files("fogml-lab") or [] if f.name == _FIRST]
+    except PackageNotFoundError:
+        installed = []
+    for path in installed:
+        if path.is_file():
+            return path.resolve().parent
+    raise InputError(
+        "the pages of the documentation are not beside this installation; they are the folder docs of the "
+        "source, and what `pip install .` there brings along"
+    )
+
+
+def page_names(folder: Path | None = None) -> list[str]:
+    """Stems of a folder's pages (of `manual_folder` if None), in the order of the list on the first."""
+    text = ((folder or manual_folder()) / _FIRST).read_text(encoding="utf-8")
+    fences = re.findall(r"^```\{toctree\}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+    lines = [line.strip() for fence in fences for line in fence.splitlines()]
+    return [Path(_FIRST).stem, *(line for line in lines if line and not line.startswith(":"))]
+
+
+def page_text(folder: Path, name: str, made: Mapping[str, str] | None = None) -> str:
+    """A page's Markdown, as any reader of CommonMark shows it.
+
+    Parameters
+    ----------
+    folder
+        Where the pages lie.
+    name
+        Stem of the page.
+    made
+        By stem, what a page ends with that is made rather than written.
+
+    Raises
+    ------
+    InputError
+        If there is no such page; names those there are.
+    """
+    names = page_names(folder)
+    if name not in names:
+        raise InputError(f"no page '{name}'; {known_are(name, names, 'pages')}")
+    written = (folder / f"{name}.md").read_text(encoding="utf-8")
+    plain = re.sub(r"^```\{[a-z-]+\}.*?^```\n", "", written, flags=re.MULTILINE | re.DOTALL)
+    return plain + (made or {}).get(name, "")
+
+
+def title_of(text: str) -> str:
+    """The first heading of a page."""
+    return next((line.lstrip("# ") for line in text.splitlines() if line.startswith("# ")), "")
+
+
+def mathml(formula: str) -> str:
+    """A formula in LaTeX as a ``math`` element, which browsers draw without a script."""
+    from docutils.utils.math.latex2mathml import tex2mathml
+
+    return str(tex2mathml(formula.strip(), as_block=True))
+
+
+def manual_page(folder: Path, made: Mapping[str, str] | None = None) -> str:
+    """All pages as one HTML page, formulas and pictures within it; the first lists the others."""
+    names = page_names(folder)
+    texts = {name: page_text(folder, name, made) for name in names}
+    sections = [(name, Markup(_html(text, name, names, folder))) for name, text in texts.items()]
+    return render("manual.html", title=f"fogml {fogml.__version__}: the manual", sections=sections)
+
+
+def _html(text: str, name: str, names: Iterable[str], folder: Path) -> str:
+    from markdown_it import MarkdownIt
+
+    reader = MarkdownIt("commonmark", {"html": False}).enable("table")
+    tokens = reader.parse(text)
+    for place, token in enumerate(tokens):
+        if token.type == "heading_open":
+            token.attrSet("id", _anchor(name, tokens[place + 1].content))
+        if token.type == "fence" and token.info.strip() == "math":
+            token.type, token.content = "html_block", mathml(token.content)
+        for child in token.children or []:
+            if child.type == "link_open":
+                child.attrSet("href", _address(str(child.attrGet("href")), name, set(names)))
+            if child.type == "image":
+                child.attrSet("src", _data(folder / str(child.attrGet("src"))))
+    return reader.renderer.render(tokens, reader.options, {})
+
+
+def _anchor(name: str, heading: str = "") -> str:
+    """Identifier of a heading of a page; of the page itself where none is given."""
+    slug = re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+    return f"{name}--{slug}" if slug else name
+
+
+def _address(address: str, name: str, names: set[str]) -> str:
+    """A link between pages as one within the page; others stay as they are."""
+    page, _, heading = address.partition("#")
+    stem = page.removesuffix(".md") or name
+    if (page and not page.endswith(".md")) or stem not in names:
+        return address
+    return f"#{_anchor(stem, heading)}"
+
+
+def _data(path: Path) -> str:
+    content: Any = base64.b64encode(path.read_bytes()).decode("ascii")
+    return f"data:{_MEDIA[path.suffix]};base64,{markup(content)}"
 
 
 def options_page() -> str:

@@ -130,7 +130,7 @@ class DocsSettings(Settings):
 
     job: ClassVar[str] = "fogml.cli.docs_job:show_docs"
     page: Annotated[
-        str | None, argument("[PAGE]", "A page to print here.", known="fogml.report.manual:page_names")
+        str | None, argument("[PAGE]", "A page to print here.", known="fogml.cli.docs_job:page_names")
     ] = None
     out: Annotated[
         str | None, option("File to write: .html.", "--out", "-o", metavar="FILE", writes=True)

@@ -262,7 +262,8 @@ def _replay_values(settings: ReplaySettings, twin: str, run: Run, replayed: Floa
         "replayed_rms": _rms(replayed),
     }
     if settings.only is None:
-        gap = run.gyro_deg_h - replayed if _in_rate(run) else None
+        is_rate = run.gyro_unit == "deg/h" or run.facts.scale_factor is not None
+        gap = run.gyro_deg_h - replayed if is_rate else None
         values["gap_mean"] = float(gap.mean()) if gap is not None else None
         values["gap_rms"] = _rms(gap) if gap is not None else None
     return values
@@ -279,11 +280,6 @@ def _print_replay(settings: ReplaySettings, values: dict[str, Any], terminal: Te
         )
     terminal.say(f"Written to {settings.out}")
     terminal.result(values)
-
-
-def _in_rate(run: Run) -> bool:
-    """Whether the output is known as a rate."""
-    return run.gyro_unit == "deg/h" or run.facts.scale_factor is not None
 
 
 def _rms(values: FloatArray) -> float:

@@ -68,6 +68,7 @@ def _unit(unit: UnitWatch) -> dict[str, Any]:
 def _alarm(unit: UnitWatch, change: Change) -> dict[str, Any]:
     age, runs = unit.age, unit.records
     first, last = change.onset_ci90
+    per = "" if change.shape == "step" else f" per {'day' if unit.dated else 'run'}"
     return {
         "raised_at": runs[change.raised_at].run,
         "raised_at_index": change.raised_at,
@@ -82,13 +83,9 @@ def _alarm(unit: UnitWatch, change: Change) -> dict[str, Any]:
         "probability": change.probability,
         "size": change.size,
         "size_ci90": list(change.size_ci90),
-        "unit": FIGURES[change.figure] + ("" if change.shape == "step" else " per " + _age_word(unit)),
+        "unit": FIGURES[change.figure] + per,
         "nearest": list(NEAREST[change.figure, change.shape]),
     }
-
-
-def _age_word(unit: UnitWatch) -> str:
-    return "day" if unit.dated else "run"
 
 
 def _calibration(told: Calibration) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from pathlib import Path
 from fogml.blind.folders import CaseFiles
 from fogml.blind.methods import diagnosis
 from fogml.gap.result import Diagnosis
-from fogml.gap.result_parts import RunSeries
 from fogml.report import figures_gap, figures_gap_evidence, figures_gap_where, gap_tables, gap_tables_ahead
 from fogml.report.gap_tiles import error_sentences, headline_tiles, warnings
 from fogml.report.gap_words import (
@@ -41,6 +40,7 @@ def gap_page(found: Diagnosis) -> str:
     names = titles(found)
     where = found.where
     drawn = _drawn(found)
+    fitted_on = any(s.role == "fit" and len(s.time_s) for s in found.series)
     return render(
         "gap.html",
         title=f"{subject_of(found)} – {verdict_words(found).lower()}",
@@ -67,7 +67,7 @@ def gap_page(found: Diagnosis) -> str:
         how_far_notes=[f"{item.run}: {item.note}." for item in found.how_far if item.note],
         runs=drawn,
         not_drawn=[s.run for s in found.series if s.run not in {d.name for d in drawn}],
-        against_temperature=figures_gap.against_temperature(found) if _fit_series(found) else None,
+        against_temperature=figures_gap.against_temperature(found) if fitted_on else None,
         by_regime=figures_gap_where.by_regime(where.regime) if where.regime else None,
         by_timescale=figures_gap_where.by_timescale(where.timescale) if where.timescale else None,
         by_temperature=figures_gap_where.by_temperature(where.temperature) if where.temperature else None,
@@ -112,10 +112,6 @@ def _kicker(found: Diagnosis) -> str:
         f"Gap between the twin “{found.model}” and {subject_of(found)}: "
         f"fitted on {plural(len(found.fit), 'run')}, {held}"
     )
-
-
-def _fit_series(found: Diagnosis) -> list[RunSeries]:
-    return [s for s in found.series if s.role == "fit" and len(s.time_s)]
 
 
 def _drawn(found: Diagnosis) -> list[RunSection]:

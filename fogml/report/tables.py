@@ -248,9 +248,6 @@ def noticed(findings: Iterable[Finding | Mapping[str, Any]]) -> list[Noticed]:
         values = finding.as_dict() if isinstance(finding, Finding) else finding
         place = [f"column {values['column']}"] if values.get("column") else []
         place += [f"from row {values['row']}"] if values.get("row") else []
-        shown.append(Noticed(str(values["code"]), _sentence(str(values["message"])), ", ".join(place)))
+        message = str(values["message"])
+        shown.append(Noticed(str(values["code"]), message[:1].upper() + message[1:], ", ".join(place)))
     return shown
-
-
-def _sentence(message: str) -> str:
-    return message[:1].upper() + message[1:]

@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,7 +154,8 @@ class LineReader:
         with io.TextIOWrapper(opened, encoding=dialect.encoding, errors="replace", newline="") as file:
             for _ in range(dialect.skipped_lines):
                 file.readline()
-            reader = csv.reader(_without_zero_bytes(file), delimiter=dialect.separator, strict=True)
+            lines = (line.replace("\x00", "\ufffd") for line in file)
+            reader = csv.reader(lines, delimiter=dialect.separator, strict=True)
             begin = dialect.skipped_lines + 1
             try:
                 for fields in reader:
@@ -204,10 +204,6 @@ class _Fault(Exception):
     """A row that can't be read."""
 
 
-def _without_zero_bytes(file: Any) -> Iterator[str]:
-    return (line.replace("\x00", "\ufffd") for line in file)
-
-
 _TAIL_BYTES = 1 << 15
 _LEAST_LINES = 20
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+\Z")
@@ -224,13 +220,12 @@ def without_footer(dialect: CsvDialect) -> tuple[CsvDialect, list[Finding]]:
     forms = dict(dialect.stamps.columns) if dialect.stamps else {}
     clock = {*forms, *(i for i in places if dialect.name(i) == "time")}
 
-    def is_value(field: str) -> bool:
-        return dialect.value(field) is not None
-
     def is_sample(line: str) -> bool:
         fields = fields_of(line, dialect.separator)
         held = {i: fields[i] for i in {*places, *forms} if i < len(fields) and fields[i].strip()}
-        found = {i: forms[i].matches(f) if i in forms else is_value(f) for i, f in held.items()}
+        found = {
+            i: forms[i].matches(f) if i in forms else dialect.value(f) is not None for i, f in held.items()
+        }
         # Means below a column stand beside a word.
         is_told = any(not found[i] and held[i].strip(' "')[:1].isalpha() for i in clock & found.keys())
         return any(found.values()) and not is_told

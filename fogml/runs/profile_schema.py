@@ -110,7 +110,10 @@ class ImportProfile(TextLayout):
     @model_validator(mode="after")
     def _consistent(self) -> ImportProfile:
         _check_columns(self)
-        _check_clock(self)
+        if ("time" in self.columns) == (self.sample_s is not None):
+            raise ValueError(
+                "give either a column 'time' or 'sample_s', the interval where no clock is recorded"
+            )
         if not self.header:
             if self.fields is None:
                 raise ValueError("key 'fields': without a header the number of fields must be stated")
@@ -196,11 +199,6 @@ def _check_units(columns: dict[str, ImportColumn]) -> None:
             units = [*spec.units, *([STAMP] if name == "time" else [])]
             told = known_are(str(column.unit), units, "accepted units")
             raise ValueError(f"key 'columns.{name}.unit': {quoted(column.unit)} is not accepted; {told}")
-
-
-def _check_clock(profile: ImportProfile) -> None:
-    if ("time" in profile.columns) == (profile.sample_s is not None):
-        raise ValueError("give either a column 'time' or 'sample_s', the interval where no clock is recorded")
 
 
 def profile_names() -> tuple[str, ...]:

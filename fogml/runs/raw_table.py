@@ -29,11 +29,6 @@ def numbered_row(index: int) -> str:
     return f"row {index + 1}"
 
 
-def named_from(start: int) -> Callable[[int], str]:
-    """Names rows of a block that begins at the row with index `start`."""
-    return lambda i: numbered_row(start + i)
-
-
 def text_column(name: str) -> Finding:
     """What to say of a column that holds no numbers."""
     return Finding("text_column", f"column {quoted(name)} holds no numbers and is left out", column=name)
@@ -153,7 +148,7 @@ def stored_blocks(
     for start in range(0, max(count, 1), step):
         stop = min(start + step, count)
         values = {cell: stored.read(array, start, stop) for cell, array in vectors}
-        yield RawTable(stored.path.name, cells, values, facts, named_from(start), findings)
+        yield RawTable(stored.path.name, cells, values, facts, _shifted(numbered_row, start), findings)
 
 
 def moment(origin_s: object) -> datetime | None:
@@ -221,4 +216,5 @@ class RawTable:
 
 
 def _shifted(row_name: Callable[[int], str], start: int) -> Callable[[int], str]:
+    """Names rows of a block that begins at the row with index `start`."""
     return lambda i: row_name(start + i)

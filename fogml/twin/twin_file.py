@@ -127,7 +127,8 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
             moved(twin, name, 0.0)
         return twin
     except InputError as error:
-        raise InputError(_prefixed(source, str(error))) from None
+        told = str(error).removeprefix(f"{source}: ")
+        raise InputError(f"{source}: {told}") from None
 
 
 def twin_dict(twin: Twin) -> dict[str, Any]:
@@ -283,7 +284,3 @@ def _value(source: str, key: str, held: Stated, quantity: Quantity) -> float:
             f"{low:g} and {with_unit(high, quantity.unit)}"
         )
     return value
-
-
-def _prefixed(source: str, message: str) -> str:
-    return message if message.startswith(f"{source}: ") else f"{source}: {message}"

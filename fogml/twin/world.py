@@ -13,13 +13,21 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.twin.attitude import attitude, earth_field
-from fogml.twin.chain import Branch, ChainOutput, hidden, logged, sensed, sensor_shares, through_chain
+from fogml.twin.chain import (
+    Branch,
+    ChainOutput,
+    RandomErrors,
+    hidden,
+    logged,
+    sensed,
+    sensor_shares,
+    through_chain,
+)
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.noise import Streams
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.programme import Programme
-from fogml.twin.random_errors import RandomErrors
 from fogml.twin.replay_after import (
     Storage,
     later_s,

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from fogml.cli import docs_job as manual
 from fogml.errors import InputError
-from fogml.report import manual
 
 
 class Page(HTMLParser):

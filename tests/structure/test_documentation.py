@@ -14,8 +14,8 @@ import pytest
 
 import fogml
 from experiments.guide_commands.__main__ import NEEDS_NETWORK, ROOT, blocks_of, files_of, lines_of, pages
+from fogml.cli.docs_job import page_names
 from fogml.cli.main import app
-from fogml.report.manual import page_names
 from fogml.runs.shipped import shipped_names
 
 CODE = Path(fogml.__file__).parent
