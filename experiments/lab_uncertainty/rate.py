@@ -70,6 +70,13 @@ CASES = {
         soaks=(-40.0, 10.0, 60.0),
         bias_slope=0.02,
     ),
+    "five soaks turned one way": Ladder(
+        TACTICAL,
+        rates=(0.0, 10.0, 0.0, 20.0, 0.0),
+        sensitivity_ppm=2.0,
+        soaks=(-40.0, -15.0, 10.0, 35.0, 60.0),
+        bias_slope=0.02,
+    ),
 }
 
 

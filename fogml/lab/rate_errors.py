@@ -43,7 +43,7 @@ def spread_of(
     parts: tuple[FloatArray, FloatArray],
     *,
     squares: float = 0.0,
-    freedom: int = 0,
+    freedom: float = 0.0,
     least: float = 0.0,
 ) -> Spread | None:
     """Spread of ``gain @ values`` whose variances are ``s**2 (parts[0] + u**2 parts[1])``, s and u unknown.

@@ -80,9 +80,12 @@ def temperature_sensitivity(runs: Sequence[Run], least_deg_h: float, most_deg_h:
         The greatest rate that the output follows [deg/h].
     """
     parts = {run.name: _steps(run, least_deg_h, most_deg_h) for run in runs if run.temperature_columns}
+    for place, part in enumerate(parts.values()):
+        # Rows of other runs are others.
+        part[:, 4:] += place * max(map(len, runs))
     parts = {name: part for name, part in parts.items() if len(part)}
     parts = {name: part for name, part in parts.items() if _apart(part)} or parts
-    steps = np.concatenate([np.empty((0, 4)), *parts.values()])
+    steps = np.concatenate([np.empty((0, 8)), *parts.values()])
     if not _apart(steps):
         return None
     soaks = _soaks(steps)
@@ -107,31 +110,51 @@ def _apart(steps: FloatArray) -> bool:
 
 
 def _steps(run: Run, least: float, most: float) -> FloatArray:
-    """Temperature [degC], and steps of rate, its size and output [deg/h], as columns, shape (k, 4)."""
+    """Temperature [degC], steps of rate, its size and output [deg/h], and rows, as columns, shape (k, 8).
+
+    The rows are [first, stop) of the pieces before and after a step.
+    """
     steps = find_steps(run, np.ones(len(run), dtype=np.bool_))
     if steps is None:
-        return np.empty((0, 4))
+        return np.empty((0, 8))
     time = run.time[steps.usable]
     lasting = [time[rows[:, 1] - 1] - time[rows[:, 0]] for rows in (steps.before, steps.after)]
     told = (np.abs(steps.levels).max(axis=1) <= most * (1.0 + 1e-9)) & (np.abs(steps.height) >= least)
     told &= np.minimum(*lasting) >= LEAST_PIECE_S
     temperature = run.temperature("T")[steps.usable[steps.after[:, 0]]]
     sizes = np.diff(np.abs(steps.levels), axis=1)[:, 0]
-    return np.column_stack([temperature, steps.height, sizes, steps.of(run.gyro_deg_h)])[told]
+    values = (temperature, steps.height, sizes, steps.of(run.gyro_deg_h), steps.before, steps.after)
+    return np.column_stack(values)[told]
+
+
+def _covariance(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Of steps between means over rows of white noise of one [1], shape (k, k).
+
+    Neighbouring steps share the plateau between them: what it is off raises one and lowers the other.
+    """
+    rows = np.concatenate((after, before))
+    sign = np.repeat((1.0, -1.0), len(after)) / np.diff(rows, axis=1)[:, 0]
+    first, stop = rows.T
+    shared = np.minimum.outer(stop, stop) - np.maximum.outer(first, first)
+    pieces = np.outer(sign, sign) * np.maximum(shared, 0.0)
+    half = len(after)
+    return np.asarray(
+        pieces[:half, :half] + pieces[half:, half:] + pieces[:half, half:] + pieces[half:, :half]
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Soaks:
-    """Temperature [degC], scale factor, and its variance in that of a step [1/(deg/h)^2], shape (s,).
+    """Temperature [degC], scale factor, and its variance in that of a row [1/(deg/h)^2], shape (s,).
 
-    ``squares`` [(deg/h)^2] and ``freedom`` are what steps differ by within soaks.
+    ``squares`` [(deg/h)^2] and ``freedom`` are what steps differ by within soaks, as of independent rows.
     """
 
     temperature: FloatArray
     scale: FloatArray
     variance: FloatArray
     squares: float
-    freedom: int
+    freedom: float
 
 
 def _soaks(steps: FloatArray) -> _Soaks:
@@ -145,13 +168,23 @@ def _soaks(steps: FloatArray) -> _Soaks:
     # Of a rate that was measured, the two columns are alike but for what it is off.
     both = [g for g in groups if np.linalg.matrix_rank(g[:, 1:3], SAME_SHARE * np.linalg.norm(g[:, 1:3])) > 1]
     columns = slice(1, 3) if both and _apart(np.concatenate(both)) else slice(1, 2)
-    told, squares, freedom = [], 0.0, 0
+    told, over, squares, expected, scatter = [], 0, 0.0, 0.0, 0.0
     for group in both if columns.stop == 3 else groups:
         inverse = np.linalg.pinv(group[:, columns])
         solved = inverse @ group[:, 3]
         left = group[:, 3] - group[:, columns] @ solved
+        covariance = _covariance(group[:, 4:6], group[:, 6:8])
+        # What is left is no simple chi-square: one of the same mean and variance (F. E. Satterthwaite,
+        # Biometrics Bulletin 2 (1946) 110).
+        spread = covariance - group[:, columns] @ (inverse @ covariance)
+        over += len(group) - len(solved)
         squares += float(left @ left)
-        freedom += len(group) - len(solved)
-        told.append((float(group[:, 0].mean()), float(solved[0]), float(inverse[0] @ inverse[0])))
-    temperature, scale, variance = np.array(told).T
-    return _Soaks(temperature, scale, variance, squares, freedom)
+        expected += float(np.trace(spread))
+        scatter += float(np.sum(spread * spread.T))
+        told.append(
+            (float(group[:, 0].mean()), float(solved[0]), float(inverse[0] @ covariance @ inverse[0]))
+        )
+    temperature, scale, variances = np.array(told).T
+    if not over:
+        return _Soaks(temperature, scale, variances, 0.0, 0.0)
+    return _Soaks(temperature, scale, variances, squares * expected / scatter, expected**2 / scatter)

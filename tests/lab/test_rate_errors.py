@@ -13,6 +13,7 @@ from fogml.arrays import FloatArray
 from fogml.lab.rate_errors import spread_of
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_pieces import find_plateaus
+from fogml.lab.rate_temperature import _soaks
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 
@@ -90,12 +91,12 @@ def test_counts_leave_a_mean_as_well_known_as_it_is() -> None:
 
 def test_soaks_of_three_temperatures_have_an_interval_of_few_degrees_of_freedom() -> None:
     held: list[bool] = []
-    for seed in range(40):
+    for seed in range(48):
         rng = np.random.default_rng(seed)
         rate = np.tile(np.repeat([0.0, 10.0, -10.0, 0.0], 60), 3)
         warmth = np.repeat([-40.0, 10.0, 60.0], 240)
-        # Soaks miss the line by 10 ppm, which three of them hardly tell.
-        off = 10.0 * np.repeat(rng.standard_normal(3), 240)
+        # Soaks miss the line by up to 10 ppm, which three of them hardly tell.
+        off = (0.0, 1.0, 3.0, 10.0)[seed % 4] * np.repeat(rng.standard_normal(3), 240)
         gyro = 3600.0 * rate * (1.0 + 1e-6 * (2.0 * (warmth - 10.0) + off))
         gyro += 0.5 * rng.standard_normal(len(rate))
         columns: dict[str, Any] = {
@@ -121,6 +122,23 @@ def test_soaks_that_turned_one_way_are_no_half_of_a_scale_factor(one_way: list[i
     sensed = rate_json([Run("soaks", columns, Facts())], source="table")["temperature_sensitivity"]
     assert sensed["ppm_per_degC"] == pytest.approx(2.0, abs=0.1)
     np.testing.assert_allclose(sensed["scale_factor"], SCALE, rtol=2e-4)
+
+
+@pytest.mark.parametrize("rates", [[0.0, 10.0, 0.0], [0.0, 10.0, 0.0, 20.0, 0.0], [0.0, 10.0, -10.0, 0.0]])
+def test_steps_that_share_plateaus_tell_how_far_a_scale_factor_is_off(rates: list[float]) -> None:
+    """Plateaus of 60 rows with noise of 1 deg/h: scatter of scale factors and noise told, over many soaks."""
+    rng = np.random.default_rng(5)
+    levels, found, squares, freedom = np.array(rates), [], 0.0, 0.0
+    rows = 60 * np.arange(len(levels) + 1.0)
+    sizes = np.diff(np.abs(levels))
+    for _ in range(1000):
+        off = np.diff(levels + rng.standard_normal(len(levels)) / np.sqrt(60.0))
+        pieces = (rows[:-2], rows[1:-1], rows[1:-1], rows[2:])
+        soak = _soaks(np.column_stack([np.zeros(len(off)), np.diff(levels), sizes, off, *pieces]))
+        found.append(soak.scale[0])
+        squares, freedom = squares + soak.squares, freedom + soak.freedom
+    assert squares / freedom == pytest.approx(1.0, rel=0.1)
+    assert np.std(found) == pytest.approx(np.sqrt(soak.variance[0]), rel=0.1)
 
 
 def test_one_known_part_gives_student_s_interval() -> None:
