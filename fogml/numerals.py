@@ -1,6 +1,10 @@
-"""Numbers as text."""
+"""Numbers as text, and numbers and names as people read them."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 
 def number_text(value: float) -> str:
@@ -22,3 +26,145 @@ def short(value: float | None, digits: int = 3) -> str:
         return "–"
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e" in text and 1.0 <= abs(value) < 1e7 else text
+
+
+_LABELS = {
+    "bias": "Bias",
+    "bias_stability": "Bias stability",
+    "bias_stability_10s": "Bias stability, 10 s averages",
+    "range": "Range",
+    "rms": "Rms",
+    "scale_factor_error": "Scale-factor error",
+    "scale_factor_error_largest": "Scale-factor error, largest of single turns",
+    "scale_factor_nonlinearity": "Scale-factor nonlinearity",
+    "scale_factor_asymmetry": "Scale-factor asymmetry",
+    "scale_factor_repeatability": "Scale-factor repeatability",
+    "bias_repeatability": "Bias repeatability",
+    "turn_on_time": "Turn-on time",
+    "temperature_sensitivity": "Bias temperature sensitivity",
+    "hysteresis": "Thermal hysteresis",
+    "design_index": "Design index (largest rms)",
+}
+_UNITS = {
+    "scale_factor_error": "ppm",
+    "scale_factor_error_largest": "ppm",
+    "scale_factor_nonlinearity": "ppm",
+    "scale_factor_asymmetry": "ppm",
+    "scale_factor_repeatability": "ppm",
+    "turn_on_time": "s",
+    "temperature_sensitivity": "deg/h/°C",
+    "design_index": "deg/h",
+}
+MISSING = "–"
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def label(quantity: str) -> str:
+    """The name of a quantity of `Metrics` in words; an unknown one with spaces for underscores."""
+    return _LABELS.get(quantity, quantity.replace("_", " ").capitalize())
+
+
+def unit_of(quantity: str) -> str:
+    """The unit of a quantity of `Metrics`."""
+    return _UNITS.get(quantity, "deg/h")
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number to so many significant digits; a dash where there is none.
+
+    Powers of ten only below 1e-4 and from 1e7 on.
+    """
+    if value is None or not math.isfinite(value):
+        return MISSING if value is None or math.isnan(value) else ("∞" if value > 0 else "−∞")
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if exponent < -4 or exponent >= 7:
+        mantissa, power = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa} × 10{str(int(power)).translate(_RAISED)}".replace("-", "−")
+    return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
+
+
+def to_error(value: float, error: float | None, most: int = 4) -> str:
+    """A number to the second digit of its standard error, but with at most so many decimals."""
+    decimals = max(1 - math.floor(math.log10(error)), 0) if error else most
+    return f"{value:.{min(decimals, most)}f}".replace("-", "−")
+
+
+def with_error(value: float, se: float) -> str:
+    """A value with its standard error, both to the error's second figure; bare where there is none."""
+    value = 0.0 if abs(value) < 0.005 * se else value
+    if not (math.isfinite(se) and se > 0.0):
+        return number(value)
+    places = 1 - math.floor(math.log10(se))
+    if places < -2 or places > 6:
+        return f"{number(value)} ± {number(se, 2)}"
+    if places <= 0:
+        return f"{value:.0f} ± {se:.0f}".replace("-", "−")
+    told = f"{value:.{places}f}"
+    told = told.removeprefix("-") if float(told) == 0.0 else told
+    return f"{told} ± {se:.{places}f}".replace("-", "−")
+
+
+def probability_words(probability: float) -> str:
+    """A probability in whole percent, never as certainty."""
+    if probability < 0.01:
+        return "under 1 %"
+    if probability > 0.99:
+        return "over 99 %"
+    return f"{100 * probability:.0f} %"
+
+
+def stated(value: float) -> str:
+    """A number that somebody stated, such as a limit, as they would write it."""
+    return f"{value:.10g}".replace("-", "−")
+
+
+def percent(share: float | None) -> str:
+    """A share (0 to 1) in percent; "under 0.1 %" rather than a zero that is none."""
+    if share is None or not math.isfinite(share):
+        return MISSING
+    if 0 < share < 0.001:
+        return "under 0.1 %"
+    if 0.999 < share < 1:
+        return "over 99.9 %"
+    return f"{100 * share:.{0 if share in (0, 1) else 1}f} %".replace("-", "−")
+
+
+def lowest_from(noise: Mapping[str, Any]) -> str:
+    """From what time on the minimum of a ``noise.json`` is looked for; empty where none before is lower."""
+    lowest = noise["minimum"]
+    before = [value for tau, value in zip(noise["taus_s"], noise["adev"]) if tau < lowest["tau_s"]]
+    if min(before, default=lowest["adev"]) >= lowest["adev"]:
+        return ""
+    return f" (of times from {number(noise.get('holds_from_s'))} s on, where the terms hold)"
+
+
+def plural(count: int, word: str, words: str | None = None) -> str:
+    """``3 runs``, ``1 run``; thousands apart."""
+    return f"{count:,}".replace(",", " ") + " " + (word if count == 1 else words or word + "s")
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """``a``, ``a and b``, ``a, b and c``; beyond ``most`` names the rest as a count."""
+    if len(names) > most:
+        return ", ".join(names[: most - 1]) + f" and {len(names) - most + 1} more"
+    if len(names) < 2:
+        return "".join(names)
+    return ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def averages(seconds: float) -> str:
+    """The averaging time in words: ``100 s averages``."""
+    return f"{short(seconds, 4)} s averages"
+
+
+def duration(seconds: float) -> str:
+    """A span of time in the unit that reads best: ``36 s``, ``12.5 min``, ``7.58 h``, ``4.2 d``."""
+    if seconds < 120:
+        return f"{number(seconds)} s"
+    if seconds < 2 * 3600:
+        return f"{number(seconds / 60)} min"
+    if seconds < 3 * 86400:
+        return f"{number(seconds / 3600)} h"
+    return f"{number(seconds / 86400)} d"

@@ -28,8 +28,8 @@ from fogml.blind.methods import load_method
 from fogml.blind.score import marks_of
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.truth import read_truth
+from fogml.numerals import MISSING
 from fogml.report.benchmark_page import share_text, value_text
-from fogml.report.words import MISSING
 
 HERE = Path(__file__).parent
 PARTS = ("nothing", "one_strong", "one_weak", "two", "unknown", "unknown_and_known")

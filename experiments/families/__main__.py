@@ -27,8 +27,8 @@ from fogml.blind.folders import DIAGNOSIS, BlindFolder, read_json
 from fogml.blind.plan import SAME_TWIN
 from fogml.blind.scoring.by_reality import by_reality
 from fogml.blind.scoring.marks import Mark
+from fogml.numerals import MISSING, plural
 from fogml.report.blind_tables import figure_text, wanted_text
-from fogml.report.words import MISSING, plural
 
 HERE = Path(__file__).parent
 

@@ -28,10 +28,10 @@ from fogml.blind.truth import read_truth
 from fogml.cli.blind import MakeSettings, RunSettings
 from fogml.cli.blind_job import make_and_tell, run_and_tell
 from fogml.cli.terminal import Terminal
+from fogml.numerals import MISSING, plural
 from fogml.outputs import whole_file
 from fogml.report.blind_tables import figure_text, value_text, wanted_text
 from fogml.report.gap_tiles import ERROR_RATES, error_rates
-from fogml.report.words import MISSING, plural
 from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent

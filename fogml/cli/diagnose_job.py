@@ -19,8 +19,8 @@ from fogml.gap.own_simulator import ByColumn, by_column, has_column
 from fogml.gap.result import Diagnosis
 from fogml.gap.units import UnitsDiagnosis, diagnose_units
 from fogml.json_files import write_json
+from fogml.numerals import with_error
 from fogml.outputs import whole_folder
-from fogml.report.words import with_error
 from fogml.runs.columns import REPLAYED
 from fogml.runs.run import Run
 from fogml.twin.twin_file import load_twin

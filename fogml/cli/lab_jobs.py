@@ -16,8 +16,7 @@ from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows
-from fogml.numerals import short
-from fogml.report.words import duration, to_error, with_error
+from fogml.numerals import duration, short, to_error, with_error
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:

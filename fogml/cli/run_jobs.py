@@ -11,9 +11,9 @@ from fogml.cli.run_commands import ImportSettings, InspectSettings, NoiseSetting
 from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs, tell
 from fogml.cli.terminal import Terminal, number, span
 from fogml.errors import InputError
+from fogml.numerals import duration, lowest_from
 from fogml.outputs import scratch_folder, whole_file, whole_folder
 from fogml.readers import plain_path
-from fogml.report.words import duration, lowest_from
 from fogml.runs.columns import header
 from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.noise_of_run import moving_temperatures, noise_report

@@ -209,8 +209,8 @@ def floor_words(run: RunJudgement) -> str:
 
 def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     """The figures of the test runs as a table, then limits and notes."""
+    from fogml.numerals import label, unit_of
     from fogml.report.verdict import own_noise_by, unsettled, worst_run
-    from fogml.report.words import label, unit_of
 
     rows = []
     for run in judgement.test:

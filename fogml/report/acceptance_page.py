@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from fogml.numerals import short
+from fogml.numerals import MISSING, listed, number, percent, plural, short, stated
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table, columns_of
-from fogml.report.words import MISSING, listed, number, percent, plural, stated
 
 VERDICTS = {
     "accepted": ("met", "✓", "Accepted"),

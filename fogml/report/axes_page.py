@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from fogml.numerals import MISSING, averages, duration, number
 from fogml.report.acceptance_page import VERDICTS, limit_words
 from fogml.report.page import render
 from fogml.report.tables import Table, columns_of
 from fogml.report.verdict import GRADES
-from fogml.report.words import MISSING, averages, duration, number
 
 PAGES = {
     "train": "report.html",

@@ -8,12 +8,11 @@ from typing import Any
 import plotly.graph_objects as go
 
 from fogml.benchmark.score import ALL, FIGURES
-from fogml.numerals import short
+from fogml.numerals import MISSING, number, percent, plural, short
 from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.style import log_axis
 from fogml.report.tables import Table, columns_of
-from fogml.report.words import MISSING, number, percent, plural
 
 _WORDS = (
     (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fogml.numerals import MISSING, listed, number, percent, plural, stated
 from fogml.report.blind_tables import (
     by_form_table,
     by_reality_table,
@@ -21,7 +22,6 @@ from fogml.report.blind_tables import (
 )
 from fogml.report.page import render
 from fogml.report.tables import Table, columns_of
-from fogml.report.words import MISSING, listed, number, percent, plural, stated
 
 _ORACLE = "oracle"
 _STRATA_DRAWN = ("one_exact", "two_exact", "unknown_wrong_name", "mixed_known_kept", "mixed_false_name")

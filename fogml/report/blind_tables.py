@@ -9,11 +9,10 @@ import plotly.graph_objects as go
 
 from fogml.blind.folders import DIAGNOSIS
 from fogml.blind.methods import ABSTAIN, BASELINES
-from fogml.numerals import short
+from fogml.numerals import MISSING, number, percent, short, stated
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.tables import Table, columns_of
-from fogml.report.words import MISSING, number, percent, stated
 
 _KINDS = {
     "nothing": "nothing missing",

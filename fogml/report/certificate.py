@@ -9,7 +9,7 @@ from datetime import date as Date
 import numpy as np
 from markupsafe import Markup
 
-from fogml.numerals import short
+from fogml.numerals import averages, listed, number, percent, short, unit_of
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import render
@@ -24,7 +24,6 @@ from fogml.report.verdict import (
     unseen,
     worst_run,
 )
-from fogml.report.words import averages, listed, number, percent, unit_of
 from fogml.signals.drawn import drawn
 from fogml.validation.advice import advice_on
 from fogml.validation.certified import held_constant, of_10_s, over_temperature

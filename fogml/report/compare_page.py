@@ -9,12 +9,12 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from fogml.numerals import MISSING, averages, listed, number, percent
 from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.style import log_axis, segments_of, shade, time_unit
 from fogml.report.tables import Row, Table, columns_of
 from fogml.report.verdict import floor_told, own_noise, stated_limits, unseen, worst_run
-from fogml.report.words import MISSING, averages, listed, number, percent
 from fogml.signals.drawn import drawn, gap_starts
 from fogml.validation.results import Judgement, RunJudgement
 

@@ -14,10 +14,10 @@ import plotly.graph_objects as go
 from fogml.escaping import script_data
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Counterfactual
+from fogml.numerals import averages
 from fogml.report import style
 from fogml.report.gap_words import subject_of, title_of, titles, unit_words
 from fogml.report.page import Drawing, render, template_text
-from fogml.report.words import averages
 
 MOST_FACTOR = 3.0
 """Sliders go up to this many times the size found, or usual."""

@@ -10,11 +10,11 @@ import numpy as np
 from markupsafe import Markup
 
 from fogml.arrays import FloatArray
+from fogml.numerals import number
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import render
 from fogml.report.tables import Table, columns_of
-from fogml.report.words import number
 from fogml.signals.drawn import min_max_indices
 from fogml.twin.pictures import RATE_DEGC, AllanCurve, Picture, RateCurve
 

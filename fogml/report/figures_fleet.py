@@ -11,10 +11,10 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.fleet.summary import label_of
+from fogml.numerals import number, plural
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
-from fogml.report.words import number, plural
 
 _COLUMNS = 2
 _LABELS = 24

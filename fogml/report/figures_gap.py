@@ -12,11 +12,11 @@ from plotly.subplots import make_subplots
 from fogml.arrays import FloatArray
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import GapSegment, HowFar, RunSeries, TemperatureExcess
+from fogml.numerals import averages, listed, number, plural
 from fogml.report import style
 from fogml.report.figures_judgement import STEADY_DEG_C_PER_MIN
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis, regime_word, segments_of, shade, time_unit
-from fogml.report.words import averages, listed, number, plural
 from fogml.runs.regimes import Regimes
 from fogml.signals.drawn import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 

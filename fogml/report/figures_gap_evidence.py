@@ -11,11 +11,11 @@ from plotly.subplots import make_subplots
 
 from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport
 from fogml.intervals import Z90, Z95
+from fogml.numerals import number, with_error
 from fogml.report import style
 from fogml.report.gap_words import STATUS_WORDS, title_of, unit_words
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
-from fogml.report.words import number, with_error
 
 SHOWN = 16
 """Candidates that the figure shows, the best first, and all that are named."""

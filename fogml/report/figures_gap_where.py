@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import plotly.graph_objects as go
 
 from fogml.gap.result_parts import Share, TemperatureExcess, TimescaleExcess
+from fogml.numerals import duration, listed, number, percent
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis, regime_word
-from fogml.report.words import duration, listed, number, percent
 
 _STAGE_WORDS = {
     "rig": "rig: table, chamber, mount",

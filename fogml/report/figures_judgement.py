@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.numerals import averages, number, percent
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.style import in_order, log_axis, regime_word, segments_of, shade, time_unit
-from fogml.report.words import averages, number, percent
 from fogml.signals.drawn import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 from fogml.validation.results import AveragedSeries, RunJudgement
 

@@ -9,10 +9,10 @@ import numpy as np
 import plotly.graph_objects as go
 
 from fogml.arrays import FloatArray
+from fogml.numerals import lowest_from, number
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
-from fogml.report.words import lowest_from, number
 
 TERM_WORDS = {
     "Q": "quantisation",

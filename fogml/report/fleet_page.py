@@ -11,11 +11,11 @@ import plotly.graph_objects as go
 
 from fogml.fleet.summary import in_order_of_serial, label_of, told_of
 from fogml.fleet.tasks import DONE
+from fogml.numerals import MISSING, averages, listed, number, percent, plural
 from fogml.report import style
 from fogml.report.figures_fleet import by_unit, constants, distribution
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import Row, Table, columns_of
-from fogml.report.words import MISSING, averages, listed, number, percent, plural
 
 _PAGES = {
     "train": "report.html",

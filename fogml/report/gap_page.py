@@ -8,6 +8,7 @@ from pathlib import Path
 from fogml.blind.folders import CaseFiles
 from fogml.blind.methods import diagnosis
 from fogml.gap.result import Diagnosis
+from fogml.numerals import duration, listed, number, plural
 from fogml.report import figures_gap, figures_gap_evidence, figures_gap_where, gap_tables, gap_tables_ahead
 from fogml.report.gap_tiles import error_sentences, headline_tiles, warnings
 from fogml.report.gap_words import (
@@ -21,7 +22,6 @@ from fogml.report.gap_words import (
 )
 from fogml.report.page import Drawing, render
 from fogml.report.tables import Table
-from fogml.report.words import duration, listed, number, plural
 
 MOST_RUNS_DRAWN = 8
 

@@ -7,6 +7,7 @@ from itertools import combinations
 from typing import Any
 
 from fogml.gap.result import Diagnosis, Found
+from fogml.numerals import MISSING, averages, duration, number, percent, with_error
 from fogml.report.gap_words import (
     STATUS_WORDS,
     closed_words,
@@ -18,7 +19,6 @@ from fogml.report.gap_words import (
 )
 from fogml.report.style import regime_word
 from fogml.report.tables import Row, Table, columns_of
-from fogml.report.words import MISSING, averages, duration, number, percent, with_error
 from fogml.twin.registry import effects
 
 MOST_SEGMENTS = 12

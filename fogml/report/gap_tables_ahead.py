@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import CauseShare, Rehearsed, WhatIf
+from fogml.numerals import MISSING, averages, number, percent, probability_words
 from fogml.report.gap_words import interval_words, title_of
 from fogml.report.style import regime_word
 from fogml.report.tables import Table, columns_of
-from fogml.report.words import MISSING, averages, number, percent, probability_words
 
 MOST_ROWS = 20
 _SIZES = {"usual": "usual", "found": "as found"}

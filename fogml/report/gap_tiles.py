@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.gap.result import Diagnosis
+from fogml.numerals import MISSING, listed, number, percent, plural, probability_words
 from fogml.report.gap_words import (
     cause_words,
     closed_words,
@@ -19,7 +20,6 @@ from fogml.report.gap_words import (
     verdict_words,
 )
 from fogml.report.page import Tile
-from fogml.report.words import MISSING, listed, number, percent, plural, probability_words
 
 _FAR_UNDER_FLOOR = 0.6
 """Rms over the floor under which the floor is in doubt."""

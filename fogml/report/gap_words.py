@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fogml.gap.result import Diagnosis, Estimate, Found
 from fogml.gap.result_parts import HowFar
-from fogml.report.words import MISSING, averages, listed, number, plural, probability_words, with_error
+from fogml.numerals import MISSING, averages, listed, number, plural, probability_words, with_error
 from fogml.twin.registry import effects
 
 _UNITS = (("sqrt(h)", "√h"), ("degC2", "°C²"), ("degC", "°C"))

@@ -11,11 +11,11 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.arrays import FloatArray
+from fogml.numerals import MISSING, averages, listed, number
 from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.tables import Table, columns_of
 from fogml.report.verdict import advice_words, worst_run
-from fogml.report.words import MISSING, averages, listed, number
 from fogml.signals.drawn import DRAWN_POINTS, min_max_indices
 from fogml.validation.advice import advice_on
 from fogml.validation.results import AveragedSeries, Judgement

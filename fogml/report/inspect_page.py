@@ -10,11 +10,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.numerals import MISSING, duration, listed, number, percent, plural, stated
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import Segment, in_order, regime_word, rounded_up, shade, time_unit
 from fogml.report.tables import Noticed, Table, columns_of, noticed
-from fogml.report.words import MISSING, duration, listed, number, percent, plural, stated
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals import large

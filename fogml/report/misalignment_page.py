@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from fogml.numerals import MISSING, listed, number, plural, stated
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import Row, Table, columns_of
-from fogml.report.words import MISSING, listed, number, plural, stated
 
 
 def misalignment_page(values: Mapping[str, Any]) -> str:

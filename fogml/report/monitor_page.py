@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fogml.fleet.summary import in_order_of_serial, label_of
+from fogml.numerals import number, percent, plural
 from fogml.report.monitor_words import (
     FIGURE_WORDS,
     alarm_words,
@@ -21,7 +22,6 @@ from fogml.report.monitor_words import (
 )
 from fogml.report.page import Tile, render
 from fogml.report.tables import Table, columns_of
-from fogml.report.words import number, percent, plural
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
 

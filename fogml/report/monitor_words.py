@@ -10,12 +10,11 @@ import plotly.graph_objects as go
 
 from fogml.fleet.summary import label_of
 from fogml.intervals import Z90
-from fogml.numerals import short
+from fogml.numerals import number, plural, short
 from fogml.report import style
 from fogml.report.figures_fleet import serial_axis
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
-from fogml.report.words import number, plural
 
 FIGURE_WORDS = {
     "level": "bias",

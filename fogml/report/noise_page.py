@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from fogml.numerals import MISSING, duration, lowest_from, number
 from fogml.report.figures_noise import TERM_WORDS, allan_plot
 from fogml.report.page import Tile, render
 from fogml.report.tables import Table, columns_of, noticed
-from fogml.report.words import MISSING, duration, lowest_from, number
 
 _UNITS = {
     "urad": "µrad",

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from fogml.numerals import MISSING, duration, listed, number, stated, to_error
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import Row, Table, columns_of, noticed
-from fogml.report.words import MISSING, duration, listed, number, stated, to_error
 
 
 def north_page(values: Mapping[str, Any]) -> str:

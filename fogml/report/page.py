@@ -17,8 +17,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import fogml
+from fogml import numerals
 from fogml.escaping import figure_text, markup, script_data
-from fogml.report import words
 
 
 @dataclass(frozen=True)
@@ -111,13 +111,13 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["number"] = words.number
-    environment.filters["stated"] = words.stated
-    environment.filters["percent"] = words.percent
-    environment.filters["probability"] = words.probability_words
-    environment.filters["plural"] = words.plural
+    environment.filters["number"] = numerals.number
+    environment.filters["stated"] = numerals.stated
+    environment.filters["percent"] = numerals.percent
+    environment.filters["probability"] = numerals.probability_words
+    environment.filters["plural"] = numerals.plural
     environment.filters["breakable"] = _breakable
-    environment.globals["label"] = words.label
+    environment.globals["label"] = numerals.label
     return environment
 
 

@@ -9,13 +9,13 @@ from typing import Any
 import plotly.graph_objects as go
 
 from fogml.gap.result_parts import Rehearsed
+from fogml.numerals import MISSING, duration, listed, number, plural, stated
 from fogml.report import style
 from fogml.report.gap_tables import CONSTANTS
 from fogml.report.gap_tables_ahead import rehearsal_table
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import log_axis, time_unit
 from fogml.report.tables import Row, Table, columns_of
-from fogml.report.words import MISSING, duration, listed, number, plural, stated
 from fogml.twin.registry import effects
 
 _SWITCHES = ("power", "fan", "compressor")

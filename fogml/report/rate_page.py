@@ -9,11 +9,11 @@ import numpy as np
 from markupsafe import Markup
 
 from fogml.lab.rate_words import result_rows
+from fogml.numerals import number, stated
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import Tile, render
 from fogml.report.tables import Table, columns_of
-from fogml.report.words import number, stated
 
 
 def rate_page(values: Mapping[str, Any]) -> str:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fogml.escaping import cell_text, visible
+from fogml.numerals import label, unit_of
 from fogml.outputs import scratch_folder, whole_file
 from fogml.report.tables import coefficients_of, noticed, repeatability_table
 from fogml.report.verdict import advice_words, model_card, stated_limits, subject, verdict
-from fogml.report.words import label, unit_of
 from fogml.validation.advice import advice_on
 from fogml.validation.results import AveragedSeries, Judgement, Metrics, RunJudgement
 

@@ -9,12 +9,12 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from fogml.numerals import MISSING, averages, number, plural
 from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import log_axis
 from fogml.report.tables import Row, Table, columns_of, metrics_table
 from fogml.report.verdict import worst_run
-from fogml.report.words import MISSING, averages, number, plural
 from fogml.tuning.winner import DEFAULT
 from fogml.validation.results import Judgement
 

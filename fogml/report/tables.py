@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from fogml.report.words import averages, label, number, percent, unit_of
+from fogml.numerals import averages, label, number, percent, unit_of
 from fogml.runs.findings import Finding
 from fogml.validation.results import Judgement, Metrics, Repeatability, RunJudgement
 

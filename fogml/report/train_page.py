@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fogml.numerals import averages, listed, number, percent, plural, stated, unit_of
 from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import (
@@ -33,7 +34,6 @@ from fogml.report.verdict import (
     verdict,
     worst_run,
 )
-from fogml.report.words import averages, listed, number, percent, plural, stated, unit_of
 from fogml.validation.advice import advice_on, which_to_use
 from fogml.validation.results import Judgement, RunJudgement
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from fogml.numerals import averages, label, listed, number, percent, plural, stated, unit_of
 from fogml.report.tables import reference_of
-from fogml.report.words import averages, label, listed, number, percent, plural, stated, unit_of
 from fogml.validation.advice import SEEN, Advice, Asked
 from fogml.validation.floors import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from fogml.numerals import number
 from fogml.report import page
 from fogml.report.certificate import certificate
-from fogml.report.words import number
 from tests.report.chromium import CHROMIUM, Browser, Opened
 from tests.report.judgements import judgement
 from tests.report.many_units import batch_biases, pages_of_many

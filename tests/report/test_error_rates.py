@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from experiments import gap_blind
+from fogml.numerals import percent
 from fogml.report.gap_page import gap_page
 from fogml.report.gap_tiles import ERROR_RATES, error_rates, error_sentences
-from fogml.report.words import percent
 from tests.report.diagnoses import every_diagnosis
 from tests.report.pages import Page
 

@@ -12,6 +12,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from fogml.numerals import number
 from fogml.report.compare_page import compare_page, ranked
 from fogml.report.index_page import index_page
 from fogml.report.inspect_page import inspect_page
@@ -19,7 +20,6 @@ from fogml.report.noise_page import noise_page
 from fogml.report.page import Drawing, _Drawings
 from fogml.report.tables import metrics_table
 from fogml.report.train_page import train_page
-from fogml.report.words import number
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
 from fogml.signals.drawn import DRAWN_POINTS

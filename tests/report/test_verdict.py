@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fogml.numerals import number
 from fogml.report.verdict import model_card, own_noise, stated_limits, subject, verdict, worst_run
-from fogml.report.words import number
 from fogml.runs.findings import Finding
 from tests.report.judgements import judged_run, judgement
 
