@@ -98,15 +98,16 @@ def fitted_model(found: Inference, named: Sequence[Cause], cards: Mapping[str, C
     held, candidates = found.field, found.scene.candidates
     values = {cause.ids[0]: cards[cause.ids[0]].value for cause in named}
     others = [m for c in named if not in_form(candidates[c.ids[0]]) for m in c.members]
-    had = replaced(found, values)
+    forms = [
+        Form(declared, held, value.amplitude, value.shape)
+        for id, value in values.items()
+        if in_form(declared := candidates[id])
+    ]
+    had = replaced(found, [form.declared.id for form in forms])
     base, design = made_beside(found, held.beside(others), had), held.design(others)
-    forms = []
-    for id, value in values.items():
-        if in_form(declared := candidates[id]):
-            forms.append(Form(declared, held, value.amplitude, value.shape))
     if not forms:
         alone = Posterior.of(design, base.data)
-        return _fit(found, cards, values, Foretold(found, tuple(others), alone, {}, had))
+        return _fit(found, cards, values, Foretold(found, tuple(others), alone))
     best = optimum(forms, Root(base))
     for form, fitted in zip(forms, best.effects):
         values[form.declared.id] = EffectValue(form.declared.id, fitted.amplitude, fitted.shape)

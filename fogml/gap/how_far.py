@@ -42,7 +42,7 @@ class Foretold:
     forms
         Effects that are fitted in their cards' form, by id, and their unknowns.
     replaced
-        Effects of the model whose place forms and members take.
+        Effects of the model whose place forms take.
     """
 
     found: Inference
@@ -86,11 +86,15 @@ class Foretold:
         return np.asarray(np.concatenate([self.design(run), *slopes], axis=1) @ off)
 
     def of_cause(self, run: int, cause: Cause) -> FloatArray:
-        """What one cause makes on a run [deg/h], all of it where the model has some, shape (m,)."""
+        """What one cause makes on a run [deg/h], with what the model has of it, shape (m,)."""
         if cause.ids[0] in self.forms:
             form, unknowns = self.forms[cause.ids[0]]
             return form.on(run, unknowns)
-        return np.asarray(np.sum([self.of_member(run, m) for m in cause.members], axis=0))
+        rows, values = self.found.scene.runs[run], self.found.setting.values
+        had = [
+            rows.made(d, s.amplitude, s.shape, values) for d, s in self.found.plant.on if d.id == cause.ids[0]
+        ]
+        return np.asarray(np.sum([*had, *(self.of_member(run, m) for m in cause.members)], axis=0))
 
     def of_member(self, run: int, member: Member) -> FloatArray:
         """What one member makes on a run [deg/h], shape (m,)."""
