@@ -17,7 +17,6 @@ from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, known_are
 from fogml.escaping import markup
 from fogml.outputs import whole_file
-from fogml.report.page import render
 
 _MEDIA = {".svg": "image/svg+xml", ".png": "image/png"}
 _FIRST = "index.md"
@@ -95,6 +94,8 @@ def mathml(formula: str) -> str:
 
 def manual_page(folder: Path, made: Mapping[str, str] | None = None) -> str:
     """All pages as one HTML page, formulas and pictures within it; the first lists the others."""
+    from fogml.report.page import render
+
     names = page_names(folder)
     texts = {name: page_text(folder, name, made) for name in names}
     sections = [(name, Markup(_html(text, name, names, folder))) for name, text in texts.items()]

@@ -18,6 +18,7 @@ from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
 from fogml.signals import large
+from fogml.signals.distributions import chi2_ppf
 
 Segments = Iterable[slice | tuple[int, int]]
 
@@ -322,9 +323,5 @@ def variance_interval(edf: FloatArray, level: float) -> tuple[FloatArray, FloatA
 
     ``edf / chi2(1/2 + level/2)`` and ``edf / chi2(1/2 - level/2)``, shape of `edf`.
     """
-    from scipy.special import gammaincinv
-
     tail = 0.5 * (1.0 - level)
-    low = edf / (2.0 * gammaincinv(edf / 2.0, 1.0 - tail))
-    high = edf / (2.0 * gammaincinv(edf / 2.0, tail))
-    return np.asarray(low), np.asarray(high)
+    return np.asarray(edf / chi2_ppf(1.0 - tail, edf)), np.asarray(edf / chi2_ppf(tail, edf))
