@@ -274,7 +274,7 @@ TWIN_JOBS: tuple[Job, ...] = (
     Job(
         "flicker",
         "flicker noise, 10,000,000 samples",
-        "fogml.signals.random_noise",
+        "fogml.signals.random_noise.Flicker",
         "colorednoise.powerlaw_psd_gaussian",
         _flicker,
     ),

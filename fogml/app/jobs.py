@@ -1,6 +1,6 @@
 """Jobs of the app: a folder each, so that they outlive the server and are found again.
 
-``python -m fogml.app.runner FOLDER``: runs a job's command to its end, whatever becomes of who started it.
+``python -m fogml.app.jobs FOLDER``: runs a job's command to its end, whatever becomes of who started it.
 
 The process has a session of its own. ``process.json`` says that it runs and cannot be made twice, so that a
 job never runs twice; ``ended.json`` says how it ended.
