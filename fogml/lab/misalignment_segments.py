@@ -162,12 +162,17 @@ def _check_left(rows: Rows, run: Run, kept: BoolArray, rest: BoolArray) -> None:
     if gone.any():
         first = int(starts[np.argmax(gone)])
         last = int(np.append(starts, len(kept))[np.argmax(gone) + 1]) - 1
+        recorded, around = last - first + 1, run.time[max(first - 1, 0) : last + 2]
+        there = round((around[-1] - around[0]) / run.sample_s) - 1
+        lost = recorded < 0.8 * there
+        told = f", of which {recorded} samples of about {there} are recorded" if lost else ""
         raise InputError(
             f"{rows.source}, {rows.row_name(first)}: nothing is left of the rest of "
-            f"{short(run.time[last] - run.time[first], 4)} s, as "
+            f"{short(run.time[last] - run.time[first], 4)} s{told}, as "
             f"{short(time_to_rate_s(run) + MARGIN_BEYOND_S)} s and "
             "more are cut about each change of the rate, by the longest time that table and gyro take to "
-            "settle; let rests last longer, or the table accelerate faster"
+            f"settle; {'lose fewer samples, ' if lost else ''}let rests last longer, or the table accelerate "
+            "faster"
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.runs.run import Run
-from fogml.runs.transitions import LEAST_ROWS, error_of_mean, settling_rows
+from fogml.runs.settling import LEAST_ROWS, error_of_mean, settling_rows
 from fogml.runs.turning import white_noise
 
 SETTLING_ROWS = 2

@@ -1,122 +1,16 @@
-"""Changes of the table's rate: where they are, how long outputs take to settle, which samples they spoil."""
+"""Changes of the table's rate: where they are, how long they last, which samples they spoil."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
+from fogml.runs.settling import LEAST_ROWS, settling_rows
 from fogml.runs.turning import least_rate_deg_s, white_noise
-
-LEAST_ROWS = 4
-"""Rows that tell a mean and a line."""
-
-
-def settling_rows(
-    output: FloatArray,
-    starts: IndexArray,
-    stops: IndexArray,
-    heights: FloatArray,
-    first: int,
-    *,
-    growth: float = 1.5,
-    errors: float = 4.0,
-    share: float = 1e-8,
-) -> int:
-    """Rows after a step in which the output lacks some of it, `first` at least, half of a plateau at most.
-
-    In windows that grow: what the output there differs, along the step, from the line through the plateau's
-    second half; a bias that drifts steadily is none of it.
-
-    Parameters
-    ----------
-    output
-        The gyro's output, shape (n,).
-    starts, stops
-        Rows [start, stop) of the plateaus that begin with a step, each of shape (k,).
-    heights
-        Those steps of the output, shape (k,).
-    first
-        Row that the search begins with.
-    growth
-        What a window's end is of its begin, over 1: settling is told as finely, by means of so many rows.
-    errors
-        Standard errors beyond which the output has not settled; of tens of windows noise takes none so far.
-    share
-        Of a step, what may lack all the same: a hundredth of a ppm of the scale factor, and no rounding.
-    """
-    plateaus = [
-        _settled(output, start, stop, height)
-        for start, stop, height in zip(starts.tolist(), stops.tolist(), heights.tolist(), strict=True)
-        if start + first + LEAST_ROWS <= start + (stop - start) // 2
-    ]
-    settling = first
-    while True:
-        last = max(first + LEAST_ROWS, round(growth * first))
-        lacked = squares = noise = 0.0
-        for start, half, height, count, mean, slope, spread, one in plateaus:
-            if start + first + LEAST_ROWS > half:
-                continue
-            part = output[start + first : min(start + last, half)]
-            away = first + 0.5 * (len(part) - 1) - (half - start) - 0.5 * (count - 1)
-            lacked += height * float(part.mean() - mean - slope * away)
-            squares += height**2
-            noise += height**2 * one * (1 / len(part) + 1 / count + away**2 / spread)
-        if not squares > 0.0:
-            return settling
-        if abs(lacked) > max(errors * np.sqrt(noise), share * squares):
-            # One window more: what is left goes on to fall where noise hides it.
-            settling = round(growth * last)
-        first = last
-
-
-class _Settled(NamedTuple):
-    """A plateau: first row, the row that its second half begins with, the step before it, and of that half.
-
-    Rows, mean, slope a row, the sum of squares of the rows about their middle, and the variance of one.
-    """
-
-    start: int
-    half: int
-    height: float
-    rows: int
-    mean: float
-    slope: float
-    spread: float
-    variance: float
-
-
-def _settled(output: FloatArray, start: int, stop: int, height: float) -> _Settled:
-    half = start + (stop - start) // 2
-    settled = output[half:stop]
-    count = len(settled)
-    rows = np.arange(count) - 0.5 * (count - 1)
-    spread = float(rows @ rows)
-    slope = float(rows @ settled) / spread
-    variance = error_of_mean(settled) ** 2 * count
-    return _Settled(start, half, height, count, float(settled.mean()), slope, spread, variance)
-
-
-def error_of_mean(part: FloatArray, parts: int = 16) -> float:
-    """Standard error of a mean from differences of neighbouring parts, so that a drift is no noise.
-
-    Of parts and not of rows: rounding to whole counts, which rows hold, averages out sooner than noise.
-
-    Parameters
-    ----------
-    part
-        Rows, shape (n,).
-    parts
-        How many there are: few have room for noise that is slower than a row, many tell it to a sixth.
-    """
-    rows = max(len(part) // parts, 1)
-    means = part[len(part) % rows :].reshape(-1, rows).mean(axis=1)
-    return float(np.sqrt(0.5 * np.mean(np.diff(means) ** 2) / len(means)))
-
 
 MARGIN_BEYOND_S = 2.5
 """The margin is this much longer than the time to rate, which the source bounds by 5 s."""
@@ -157,7 +51,9 @@ def time_to_rate_s(run: Run, settled_share: float = 0.02, noises: float = 6.0) -
     changes = _changes(run)
     if len(changes.start) == 0:
         return 0.0
-    longest = float((run.time[changes.stop] - run.time[changes.start]).max())
+    # Of lost rows a change may have lasted through all or none; some change has hardly any.
+    lasted = np.concatenate(([0.0], np.cumsum(np.minimum(np.diff(run.time), run.sample_s))))
+    longest = float((lasted[changes.stop] - lasted[changes.start]).max())
     return max(longest, _gyro_settling_s(run, changes, settled_share, noises))
 
 
@@ -189,12 +85,15 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
         )
     changes, time = _changes(run), run.time
     settled_s = margin_s
+    by_default = margin_s is None
     if margin_s is None or settled_s is None:
         margin_s = time_to_rate_s(run) + MARGIN_BEYOND_S
         settled_s = _settling_s(run, changes, margin_s)
     starts = changes.start
     first = np.searchsorted(time, time[starts] - margin_s)
     last = np.searchsorted(time, time[starts] + settled_s, side="right")
+    if by_default:
+        last = np.maximum(last, changes.stop)
     edges = np.zeros(len(run) + 1, dtype=np.int64)
     np.add.at(edges, np.minimum(first, np.maximum(starts - 1, 0)), 1)
     np.add.at(edges, last, -1)
@@ -272,23 +171,37 @@ def _median_of_three(values: FloatArray) -> FloatArray:
 
 
 def _gyro_settling_s(run: Run, changes: _Changes, settled_share: float, noises: float) -> float:
-    """The longest time the gyro takes to settle on its new plateau after a change [s]."""
+    """The longest time the gyro takes to settle on its new plateau after a change [s].
+
+    Of a table that hardly turns about the input axis, the share is that of the step as it is where the run's
+    others do: what Earth rate does in a turn is no settling.
+    """
     clean = _median_of_three(run.gyro)
     noise = white_noise(clean)
     edges = np.concatenate([[0], changes.start, [len(run)]])
-    longest = 0.0
+    plateaus, steps, turns = [], [], []
     for before, start, stop in zip(edges[:-2], edges[1:-1], edges[2:]):
         limit = np.searchsorted(run.time, run.time[start] + LONGEST_TRANSITION_S)
-        plateau = clean[start : min(int(stop), int(limit))]
-        if len(plateau) < 4:
+        plateau = slice(int(start), min(int(stop), int(limit)))
+        length = plateau.stop - plateau.start
+        if length < LEAST_ROWS:
             continue
-        old = float(np.median(clean[before:start][-len(plateau) :]))
-        new = float(np.median(plateau[len(plateau) // 2 :]))
-        away = np.abs(plateau - new) > max(settled_share * abs(new - old), noises * noise)
+        earlier, later = slice(max(before, start - length), start), slice(start + length // 2, plateau.stop)
+        old, new = (float(np.median(clean[rows])) for rows in (earlier, later))
+        plateaus.append((plateau, new))
+        steps.append(abs(new - old))
+        turns.append(abs(float(np.median(run.rate[later]) - np.median(run.rate[earlier]))))
+    step, turn = np.array(steps), np.array(turns)
+    if (turn > 0.0).any():
+        step = np.maximum(step, turn * float(step @ turn) / float(turn @ turn))
+    longest = 0.0
+    for (plateau, new), own, whole in zip(plateaus, steps, step.tolist(), strict=True):
+        least = max(settled_share * whole, noises * noise)
+        away = np.abs(clean[plateau] - new) > least
         # A plateau that does not hold still in its second half tells no settling time.
-        if abs(new - old) > 2.0 * noises * noise and away.any() and not away[len(plateau) // 2 :].any():
-            last = start + int(np.flatnonzero(away)[-1])
-            longest = max(longest, float(run.time[last] - run.time[start]))
+        if own > 2.0 * least and away.any() and not away[len(away) // 2 :].any():
+            last = plateau.start + int(np.flatnonzero(away)[-1])
+            longest = max(longest, float(run.time[last] - run.time[plateau.start]))
     return longest
 
 

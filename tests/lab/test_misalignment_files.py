@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from experiments.lab_uncertainty import misalignment as simulated
 from fogml.errors import InputError
-from fogml.lab.misalignment import decouple
+from fogml.lab.misalignment import TableMeasurements, decouple
 from fogml.lab.misalignment_input import read_measurements
+from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
 
 UNIT = TableUnit(K=1.2345, delta_x_deg=5.0, delta_y_deg=3.0, fixture_error_deg=0.5)
@@ -163,3 +166,19 @@ def test_no_turn_at_all(tmp_path: Path) -> None:
     rest = [row for row in lines() if ",turn," not in row]
     with pytest.raises(InputError, match="no turn"):
         read_measurements(written(tmp_path, rest))
+
+
+def test_short_rests_of_which_rows_are_lost_are_used_or_told_with_the_reason(monkeypatch):
+    """Rests of 20 s at 1 Hz, 40 % of rows lost: of a table that steps at once, and of one of 20 deg/s2."""
+    monkeypatch.setattr(simulated, "REST_S", 20)
+
+    def lossy(acceleration: float, seed: int) -> TableMeasurements:
+        monkeypatch.setattr(simulated, "ACCELERATION", acceleration)
+        rows, time, _ = simulated.recorded(simulated.CASES["tactical"], np.random.default_rng([3, seed]))
+        kept = np.random.default_rng(seed).random(len(time)) >= 0.4
+        columns = {name: getattr(rows, name)[kept] for name in ("state", "tilt_deg", "rate_deg_s", "output")}
+        return from_samples(replace(rows, **columns), time[kept])
+
+    assert len(lossy(100.0, 6).output) == 4 * 4 * 6
+    with pytest.raises(InputError, match=r"of which 7 samples of about 20 are recorded.*lose fewer samples"):
+        lossy(20.0, 0)

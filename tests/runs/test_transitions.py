@@ -66,6 +66,29 @@ def test_a_table_that_steps_at_once_takes_no_time():
         assert time_to_rate_s(run) == 0.0
 
 
+def test_earth_rate_in_turns_about_another_axis_is_no_settling():
+    """Turns of 10 deg/s upright, and of 2 deg/s with 0.3 deg of the axis along: Earth rate comes and goes."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        rate = np.concatenate([np.repeat(np.tile([0.0, size, 0.0, -size], 10), 70) for size in (10.0, 2.0)])
+        along = np.repeat([1.0, 0.005], len(rate) // 2)
+        earth = 11.5 * np.cos(np.radians(np.cumsum(rate) + 360.0 * rng.random())) * (along < 1.0)
+        gyro = 3600.0 * along * rate + earth + 0.5 * rng.standard_normal(len(rate))
+        assert time_to_rate_s(Run.from_columns(time=np.arange(len(rate)), gyro=gyro, rate=rate)) <= 2.0
+
+
+def test_lost_rows_lengthen_no_time_to_rate():
+    """A table that takes 4 s to its rate; of rows every second 40 % are lost."""
+    rise = np.linspace(0.0, 20.0, 5)
+    rate = np.tile(np.concatenate([np.zeros(40), rise, np.full(40, 20.0), rise[::-1]]), 40)
+    whole = Run.from_columns(time=np.arange(len(rate)), gyro=3600.0 * rate, rate=rate)
+    kept = np.random.default_rng(2).random(len(rate)) > 0.4
+    time, rate = np.arange(len(rate))[kept], rate[kept]
+    run = Run.from_columns(time=time, gyro=3600.0 * rate, rate=rate)
+    assert 3.0 <= time_to_rate_s(run) <= time_to_rate_s(whole) <= 4.0
+    assert set(rate[~transition_mask(run)]) == {0.0, 20.0}
+
+
 @pytest.mark.parametrize("margin_s", [0.0, 1.0, 7.3])
 @pytest.mark.parametrize("sample_s", [0.1, 1.0])
 def test_the_mask_cuts_the_margin_and_nothing_else(margin_s, sample_s):
