@@ -69,6 +69,19 @@ def unit_of(quantity: str) -> str:
     return _UNITS.get(quantity, "deg/h")
 
 
+def unit_words(unit: str) -> str:
+    """A unit as pages write it; nothing for a pure number.
+
+    Examples
+    --------
+    >>> unit_words("deg/h/sqrt(h)"), unit_words("ppm/degC2"), unit_words("1")
+    ('deg/h/√h', 'ppm/°C²', '')
+    """
+    for spelt, written in (("sqrt(h)", "√h"), ("degC", "°C"), ("C2", "C²"), ("/s2", "/s²"), ("urad", "µrad")):
+        unit = unit.replace(spelt, written)
+    return "" if unit == "1" else unit
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """A number to so many significant digits; a dash where there is none.
 

@@ -15,7 +15,7 @@ from fogml.lab.north import Drift, Scheme, check_sense, horizontal_rate
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
-from fogml.lab.rate_words import result_rows
+from fogml.lab.rate_words import result_rows, verdict_sentences
 from fogml.numerals import duration, short, to_error, with_error
 
 
@@ -112,6 +112,7 @@ def _values(settings: RateSettings, terminal: Terminal) -> dict[str, Any]:
 
 
 def _print_rate(values: dict[str, Any], terminal: Terminal) -> None:
+    terminal.say(" ".join(verdict_sentences(values, number)))
     rows = [[row.quantity, row.value, row.se, row.unit, row.remark] for row in result_rows(values, number)]
     title = f"{values['source']}: tests on a rate table" + (
         " (synthetic data)" if values["synthetic"] else ""

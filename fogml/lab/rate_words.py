@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from fogml.lab.rate_response import HALF_POWER
+from fogml.numerals import unit_words, with_error
 
 Number = Callable[[float | None], str]
 
@@ -20,8 +21,42 @@ class ResultRow(NamedTuple):
     remark: str
 
 
+def verdict_sentences(values: Mapping[str, Any], number: Number) -> list[str]:
+    """What a ``rate.json`` comes to: the scale factor, or what there is in its place; then what limits it."""
+    line, held, band = values["scale_factor"], values["range"], values["bandwidth"]
+    sentences = []
+    if line is not None:
+        straight = ""
+        if line["nonlinearity_ppm"] is not None:
+            straight = f", linear within {number(line['nonlinearity_ppm'])} ppm"
+        reach = "" if held is None else f" up to {number(held['followed_deg_s'])} deg/s"
+        ends = None if line["ci90"] is None else [1e6 * (end - 1.0) for end in line["ci90"]]
+        off = _within_90(1e6 * (line["scale_factor"] - 1.0), ends, "ppm", number)
+        sentences.append(f"The scale factor is {off} off the nominal one{straight}{reach}.")
+        if held is not None and held["exceeded_deg_s"] is not None:
+            sentences.append(f"At {number(held['exceeded_deg_s'])} deg/s the output no longer follows.")
+    elif band is not None and band["half_power_hz"] is not None:
+        sentences.append(f"The bandwidth is {number(band['half_power_hz'])} Hz.")
+    sensed = values["temperature_sensitivity"]
+    if sensed is not None:
+        told = _within_90(sensed["ppm_per_degC"], sensed["ci90"], "ppm/°C", number)
+        sentences.append(f"It moves by {told} with temperature.")
+    return sentences or ["These runs tell no scale factor; the notes say what it needs."]
+
+
+def _within_90(value: float, ends: Sequence[float] | None, unit: str, number: Number) -> str:
+    """``16.7 ± 0.3 ppm (90 %)``."""
+    if ends is None or not ends[1] > ends[0]:
+        return f"{number(value)} {unit}"
+    return f"{with_error(value, 0.5 * (ends[1] - ends[0]))} {unit} (90 %)"
+
+
 def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     """What a ``rate.json`` tells, quantity by quantity; what was not tested is left out."""
+    return [row._replace(unit=unit_words(row.unit) or row.unit) for row in _rows(values, number)]
+
+
+def _rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     rows = []
     line = values["scale_factor"]
     if line is not None:
@@ -51,7 +86,7 @@ def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     if sensed is not None:
         slope = number(sensed["ppm_per_degC"])
         remark = f"over {len(sensed['temperature'])} temperatures"
-        remark += _within(sensed["ci90"], 1.0, "ppm/degC", number)
+        remark += _within(sensed["ci90"], 1.0, "ppm/°C", number)
         rows.append(ResultRow("temperature sensitivity", slope, number(sensed["se"]), "ppm/degC", remark))
         if sensed["curvature_ppm_per_degC2"] is not None:
             curve = number(sensed["curvature_ppm_per_degC2"])
@@ -99,7 +134,7 @@ def _response(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
             rows.append(ResultRow("of a first-order loop", first, number(band["se"]), "Hz", "all gains"))
     limit = values["slew"]
     if limit is not None:
-        remark = f"the table has {number(limit['table_deg_s2'])} deg/s2"
+        remark = f"the table has {number(limit['table_deg_s2'])} deg/s²"
         name = "slew" if limit["limited"] else "slew, at least"
         rows.append(ResultRow(name, number(limit["output_deg_s2"]), "", "deg/s2", remark))
     return rows

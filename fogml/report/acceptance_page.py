@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from fogml.numerals import MISSING, listed, number, percent, plural, short, stated
+from fogml.numerals import MISSING, listed, number, percent, plural, short, stated, unit_words
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import Tile, render
@@ -21,13 +21,6 @@ VERDICTS = {
     "no_limits": ("care", "!", "No limits stated"),
 }
 """Verdicts as they are shown: colour's class, sign, words."""
-_UNITS = {
-    "deg/sqrt(h)": "deg/√h",
-    "deg/h/sqrt(h)": "deg/h/√h",
-    "urad": "µrad",
-    "deg/h/degC": "deg/h/°C",
-    "ppm/degC": "ppm/°C",
-}
 
 
 def acceptance_page(values: Mapping[str, Any]) -> str:
@@ -82,7 +75,7 @@ def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "name": row["name"],
         "standards": " · ".join(part for part in (ieee, row["gjb_2426a"]) if part),
-        "unit": _UNITS.get(row["unit"], row["unit"]),
+        "unit": unit_words(row["unit"]),
         "tested": row["tested"],
         "before": figure_words(row, "before"),
         "after": figure_words(row, "after"),

@@ -5,18 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fogml.numerals import MISSING, duration, lowest_from, number
+from fogml.numerals import MISSING, duration, lowest_from, number, unit_words
 from fogml.report.figures_noise import TERM_WORDS, allan_plot
 from fogml.report.page import Tile, render
 from fogml.report.tables import Table, columns_of, noticed
-
-_UNITS = {
-    "urad": "µrad",
-    "deg/sqrt(h)": "deg/√h",
-    "deg/h": "deg/h",
-    "deg/h/sqrt(h)": "deg/h/√h",
-    "deg/h/h": "deg/h/h",
-}
 
 
 def noise_page(noise: Mapping[str, Any]) -> str:
@@ -167,8 +159,7 @@ def _replicates(noise: Mapping[str, Any]) -> Table | None:
 
 
 def _unit(term: Mapping[str, Any]) -> str:
-    unit = str(term.get("unit", ""))
-    return _UNITS.get(unit, unit)
+    return unit_words(str(term.get("unit", "")))
 
 
 def _interval(term: Mapping[str, Any]) -> str:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from fogml.lab.rate_words import result_rows
-from fogml.numerals import number, stated
+from fogml.lab.rate_words import result_rows, verdict_sentences
+from fogml.numerals import number, stated, unit_words
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import Tile, render
@@ -24,6 +24,7 @@ def rate_page(values: Mapping[str, Any]) -> str:
         name=values["source"],
         kicker="Tests on a rate table" + (" · synthetic data" if values["synthetic"] else ""),
         values=values,
+        verdict=verdict_sentences(values, number),
         tiles=_tiles(values),
         result=_result(values),
         figures=[
@@ -140,7 +141,7 @@ def _warm(values: Mapping[str, Any]) -> tuple[str, Markup, str] | None:
     temperature, scale = np.asarray(sensed["temperature"]), np.asarray(sensed["scale_factor"])
     figure = line_figure(
         [Curve(temperature, 1e6 * (scale / scale.mean() - 1.0), style.BLUE, dots=True)],
-        "temperature [degC]",
+        "temperature [°C]",
         "scale factor [ppm]",
         "Scale factor over temperature, less its mean",
     )
@@ -179,7 +180,7 @@ def _unit(facts: Mapping[str, Any] | None) -> Table | None:
     """What follows from the unit's coil and receiver."""
     if facts is None:
         return None
-    rows = [(name, number(facts[key], 4), unit) for key, name, unit in _UNIT]
+    rows = [(name, number(facts[key], 4), unit_words(unit)) for key, name, unit in _UNIT]
     caption = (
         f"{stated(facts['length_m'])} m of fibre on {stated(facts['diameter_m'])} m, "
         f"{stated(facts['wavelength_nm'])} nm, {facts['winding']} winding of {facts['layers']} layers, "

@@ -84,6 +84,9 @@ def test_page_of_a_rate_table_has_its_figures_and_the_units_facts() -> None:
     read = Page(html := rates())
     figures = [a for a in read.of("svg") if a.get("role") == "img"]
     assert len(figures) == 4 and all(len(a["aria-label"] or "") > 20 for a in figures)
+    assert (
+        '<p class="verdict"><strong>The scale factor is ' in html and "ppm/°C" in html and "degC2" not in html
+    )
     assert "gain 0.707" in html and "Sagnac constant" in html and "synthetic" in html
     assert not read.of("link") and len(read.of("h1")) == 1
 
