@@ -13,13 +13,13 @@ from pydantic import FiniteFloat, field_validator, model_validator
 
 from fogml.errors import InputError
 from fogml.numerals import short
-from fogml.runs.run import Run
 from fogml.strict import Strict
 
 if TYPE_CHECKING:
     import optuna
 
     from fogml.models.weighing import Weighed
+    from fogml.runs.run import Run
 
 BUILDER, WINDOW = "{builder}", "{window}"
 """Where a feature text takes the builder and the window [s] that a trial chose."""
