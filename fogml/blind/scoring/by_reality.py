@@ -7,7 +7,7 @@ miss. What is named has a probability of one half or more.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.scoring.statistics import Estimate, calibration_error, mean, proportion
 from fogml.blind.scoring.table import (
+    Figure,
     calibration,
     case_ratio,
     false_names,
@@ -23,7 +24,7 @@ from fogml.blind.scoring.table import (
     seconds,
     share,
 )
-from fogml.blind.truth import FORM_DISTANCES
+from fogml.blind.truth import FORM_DISTANCES, KINDS
 
 ALL = "all"
 D_PRIMES = ((4.0, 8.0), (8.0, 12.0), (12.0, 20.0), (20.0, 60.0))
@@ -31,33 +32,6 @@ D_PRIMES = ((4.0, 8.0), (8.0, 12.0), (12.0, 20.0), (20.0, 60.0))
 _STRONG, _VERY_STRONG, _FAR = 10.0, 20.0, 0.9
 _UNKNOWN = ("unknown_left_out", "unknown_invented")
 _KNOWN = ("one", "two", "three")
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """A row.
-
-    Attributes
-    ----------
-    key, words
-        Name in ``score.json``; name on the page.
-    counts
-        Whether a case enters.
-    measure
-        The figure of those that do.
-    low, high
-        What is wanted: at least, at most.
-    format
-        How it reads.
-    """
-
-    key: str
-    words: str
-    counts: Callable[[Mark], bool]
-    measure: Callable[[Sequence[Mark]], Estimate]
-    low: float | None = None
-    high: float | None = None
-    format: str = "percent"
 
 
 def first_right(m: Mark) -> bool:
@@ -80,12 +54,12 @@ def mass_on_true(m: Mark) -> float:
     return max(held, default=0.0) / total
 
 
-def _of(*kinds: str, low: float = 0.0, high: float = np.inf) -> Callable[[Mark], bool]:
-    return lambda m: m.truth.kind in kinds and low <= m.d_prime <= high
+def _between(low: float, high: float = np.inf) -> Callable[[Mark], bool]:
+    return lambda m: low <= m.d_prime <= high
 
 
 def _far(m: Mark) -> bool:
-    cosine = m.truth.effects[0].cosine if m.truth.kind == "one" else None
+    cosine = m.truth.effects[0].cosine
     return cosine is not None and cosine < _FAR and m.d_prime > _VERY_STRONG
 
 
@@ -106,83 +80,77 @@ def within_one(estimate: Estimate) -> Estimate:
     )
 
 
-def _always(m: Mark) -> bool:
-    return True
-
-
 WANTED = (
-    Wanted(
-        "nothing_named", "nothing missing, something named", _of("nothing"),
-        share(lambda m: bool(m.named) or bool(m.failure)), high=0.02,
+    Figure(
+        "nothing_named", "nothing missing, something named",
+        share(lambda m: bool(m.named) or bool(m.failure)), ("nothing",), high=0.02,
     ),
-    Wanted(
-        "nothing_no_gap", "nothing missing: answered 'no gap'", _of("nothing"),
-        share(lambda m: m.verdict == "no_gap"),
+    Figure(
+        "nothing_no_gap", "nothing missing: answered 'no gap'",
+        share(lambda m: m.verdict == "no_gap"), ("nothing",),
     ),
-    Wanted(
+    Figure(
         "one_strong_right", "one effect, d′ 20–60: first name's class right",
-        _of("one", low=20.0, high=60.0), share(first_right), low=0.95,
+        share(first_right), ("one",), low=0.95, counts=_between(20.0, 60.0),
     ),
-    Wanted(
+    Figure(
         "one_strong_exact", "one effect, d′ 20–60: exact",
-        _of("one", low=20.0, high=60.0), share(lambda m: m.exact), low=0.90,
+        share(lambda m: m.exact), ("one",), low=0.90, counts=_between(20.0, 60.0),
     ),
-    Wanted(
+    Figure(
         "one_weak_right", "one effect, d′ 8–12: first name's class right",
-        _of("one", low=8.0, high=12.0), share(first_right), low=0.85,
+        share(first_right), ("one",), low=0.85, counts=_between(8.0, 12.0),
     ),
-    Wanted(
+    Figure(
         "one_weak_exact", "one effect, d′ 8–12: exact",
-        _of("one", low=8.0, high=12.0), share(lambda m: m.exact), low=0.80,
+        share(lambda m: m.exact), ("one",), low=0.80, counts=_between(8.0, 12.0),
     ),
-    Wanted(
+    Figure(
         "one_far_right", "one effect, form under cosine 0.9, d′ > 20: first name's class right",
-        _far, share(first_right), low=0.85,
+        share(first_right), ("one",), low=0.85, counts=_far,
     ),
-    Wanted(
+    Figure(
         "pair_exact", "two effects, both d′ > 10: exact",
-        _of("two", low=_STRONG), share(lambda m: m.exact), low=0.80,
+        share(lambda m: m.exact), ("two",), low=0.80, counts=_between(_STRONG),
     ),
-    Wanted("each_kept", "each of two or three effects kept", _of("two", "three"), each_kept),
-    Wanted(
+    Figure("each_kept", "each of two or three effects kept", each_kept, ("two", "three")),
+    Figure(
         "unknown_misnamed", "unknown, d′ > 10: a wrong name",
-        _of(*_UNKNOWN, low=_STRONG), share(lambda m: m.wrong_name), high=0.08,
+        share(lambda m: m.wrong_name), _UNKNOWN, high=0.08, counts=_between(_STRONG),
     ),
-    Wanted(
+    Figure(
         "known_kept", "known beside an unknown: kept",
-        _of("unknown_and_known"), share(lambda m: m.kept), low=0.75,
+        share(lambda m: m.kept), ("unknown_and_known",), low=0.75,
     ),
-    Wanted(
+    Figure(
         "beside_unknown_false", "known beside an unknown: a false name",
-        _of("unknown_and_known"), share(lambda m: m.wrong_name), high=0.10,
+        share(lambda m: m.wrong_name), ("unknown_and_known",), high=0.10,
     ),
-    Wanted("false_names", "named effects that are false", _always, pooled(false_names), high=0.06),
-    Wanted(
+    Figure("false_names", "named effects that are false", pooled(false_names), KINDS, high=0.06),
+    Figure(
         "mass_on_true", "mean probability on the true cause, one cause, d′ > 10 (as DX 2025)",
-        _of("one", *_UNKNOWN, low=_STRONG), lambda marks: within_one(mean([mass_on_true(m) for m in marks])),
-        low=0.90, format="number",
+        lambda marks: within_one(mean([mass_on_true(m) for m in marks])), ("one", *_UNKNOWN),
+        low=0.90, counts=_between(_STRONG), format="number",
     ),
-    Wanted(
-        "closed_ratio", "closed over what the true signature closes (median)", _of(*_KNOWN),
-        case_ratio, low=0.95, format="number",
+    Figure(
+        "closed_ratio", "closed over what the true signature closes (median)",
+        case_ratio, _KNOWN, low=0.95, format="number",
     ),
-    Wanted(
-        "calibration", "calibration error of what is listed", _always,
-        lambda marks: calibration_error(calibration(marks)), high=0.03, format="number",
+    Figure(
+        "calibration", "calibration error of what is listed",
+        lambda marks: calibration_error(calibration(marks)), KINDS, high=0.03, format="number",
     ),
-    Wanted(
+    Figure(
         "coverage", "coverage of 90 % intervals, of closed and of amplitudes",
-        _of(*_KNOWN, "unknown_and_known"),
-        pooled(lambda m: (*m.closed_covered, *m.amplitude_covered)), low=0.87, high=0.93,
+        pooled(lambda m: (*m.closed_covered, *m.amplitude_covered)), (*_KNOWN, "unknown_and_known"),
+        low=0.87, high=0.93,
     ),
-    Wanted(
-        "wrong_thermal", "wrong thermal structure: a right answer", _of("wrong_thermal"),
-        share(lambda m: m.right_for_wrong_thermal),
+    Figure(
+        "wrong_thermal", "wrong thermal structure: a right answer",
+        share(lambda m: m.right_for_wrong_thermal), ("wrong_thermal",),
     ),
-    Wanted(
-        "time", "time per case (median)", _always, seconds, format="seconds",
-    ),
-    Wanted("failed", "cases that failed", _always, share(lambda m: bool(m.failure))),
+    Figure("time", "time per case (median)", seconds, KINDS, format="seconds"),
+    Figure("failed", "cases that failed", share(lambda m: bool(m.failure)), KINDS),
 )  # fmt: skip
 """Every row of the table, in its order."""
 
@@ -191,7 +159,7 @@ def by_reality(marks: Sequence[Mark]) -> dict[str, list[dict[str, Any]]]:
     """Rows of the table for all cases and for each reality by itself."""
     names = sorted({m.truth.reality for m in marks})
     parts = {ALL: list(marks)} | {name: [m for m in marks if m.truth.reality == name] for name in names}
-    return {name: [_row(wanted, part) for wanted in WANTED] for name, part in parts.items()}
+    return {name: [row(wanted, part) for wanted in WANTED] for name, part in parts.items()}
 
 
 def by_form(marks: Sequence[Mark]) -> list[dict[str, Any]]:
@@ -220,8 +188,3 @@ def by_form(marks: Sequence[Mark]) -> list[dict[str, Any]]:
                         }
                     )
     return found
-
-
-def _row(wanted: Wanted, marks: Sequence[Mark]) -> dict[str, Any]:
-    here = [m for m in marks if wanted.counts(m)]
-    return row(wanted, here, wanted.measure(here))

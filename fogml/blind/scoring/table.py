@@ -55,6 +55,8 @@ class Figure:
         What a prototype reached.
     of_mix
         Whether it is one of the whole mix: cases that were drawn by their kind or strength would shift it.
+    counts
+        Whether a case of these kinds enters; all do if None.
     """
 
     key: str
@@ -67,10 +69,12 @@ class Figure:
     format: Literal["percent", "number", "seconds"] = "percent"
     prototype: str = ""
     of_mix: bool = False
+    counts: Callable[[Mark], bool] | None = None
 
     def chosen(self, marks: Iterable[Mark]) -> list[Mark]:
         """The cases that it counts over."""
-        return [m for m in self.of_kind(marks) if self.above == 0.0 or m.d_prime > self.above]
+        held = [m for m in self.of_kind(marks) if self.above == 0.0 or m.d_prime > self.above]
+        return held if self.counts is None else [m for m in held if self.counts(m)]
 
     def of_kind(self, marks: Iterable[Mark]) -> list[Mark]:
         """Those, of any d'."""
@@ -235,11 +239,9 @@ def rows(marks: Sequence[Mark]) -> list[dict[str, Any]]:
     """Every figure with its interval, over all of its cases, by stratum and by kind."""
     found = []
     for figure in FIGURES:
-        chosen = figure.chosen(marks)
-        estimate = figure.measure(chosen) if chosen else NOTHING
         found.append(
             {
-                **row(figure, chosen, estimate, prototype=figure.prototype),
+                **row(figure, marks, prototype=figure.prototype),
                 "by_stratum": _split(figure, marks, STRATUM_NAMES, lambda m: m.truth.stratum),
                 "by_kind": _split(figure, _evenly(figure, marks), figure.kinds, lambda m: m.truth.kind),
             }
@@ -247,8 +249,10 @@ def rows(marks: Sequence[Mark]) -> list[dict[str, Any]]:
     return found
 
 
-def row(figure: Any, chosen: Sequence[Mark], estimate: Estimate, **more: str) -> dict[str, Any]:
-    """What a score says of a figure, one here or of `fogml.blind.scoring.by_reality`, over its cases."""
+def row(figure: Figure, marks: Sequence[Mark], **more: str) -> dict[str, Any]:
+    """What a score says of a figure over its cases."""
+    chosen = figure.chosen(marks)
+    estimate = figure.measure(chosen) if chosen else NOTHING
     return {
         "key": figure.key,
         "words": figure.words,
