@@ -134,14 +134,7 @@ def run_task(task: Task) -> dict[str, Any]:
     known = finished(task, fingerprint)
     if known is not None:
         return known
-    outcome: dict[str, Any] = {
-        "schema": OUTCOME_SCHEMA,
-        "unit": task.unit.name,
-        "axis": task.unit.axis,
-        "job": task.unit.job,
-        "folder": task.unit.folder,
-        "fingerprint": fingerprint,
-    }
+    outcome = _of_unit(task) | {"fingerprint": fingerprint}
     try:
         if task.unit.fault:
             raise InputError(task.unit.fault)
@@ -180,15 +173,14 @@ def finished(task: Task, fingerprint: str | None = None) -> dict[str, Any] | Non
 
 def lost(task: Task, reason: str) -> dict[str, Any]:
     """The outcome of a unit whose job could not begin, or ended its process."""
-    return {
-        "schema": OUTCOME_SCHEMA,
-        "unit": task.unit.name,
-        "axis": task.unit.axis,
-        "job": task.unit.job,
-        "folder": task.unit.folder,
-        "status": FAILED,
-        "reason": reason,
-    }
+    return _of_unit(task) | {"status": FAILED, "reason": reason}
+
+
+def _of_unit(task: Task) -> dict[str, Any]:
+    """What every outcome begins with."""
+    unit = task.unit
+    head = {"schema": OUTCOME_SCHEMA, "unit": unit.name, "axis": unit.axis}
+    return head | {"job": unit.job, "folder": unit.folder}
 
 
 def full_disk(home: str, error: OSError) -> InputError:
