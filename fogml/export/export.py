@@ -28,7 +28,7 @@ from fogml.export.false_readings import false_reading_lines, false_readings
 from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.layout import layout
 from fogml.export.plan import Plan
-from fogml.export.points import box_points
+from fogml.export.points import box_points, reached_points
 from fogml.export.prune import pruned
 from fogml.export.settings import (
     ExportSettings,
@@ -129,7 +129,7 @@ def _pruned(
 ) -> tuple[Plan, dict[str, Any] | None]:
     if settings.budget is None:
         return whole, None
-    points = box_points(whole, settings.seed) if rows is None else rows.atoms
+    points, where = reached_points(whole, settings.seed) if rows is None else (rows.atoms, "training runs")
     columns = whole.full_columns(points)
     target = whole.value(columns) if rows is None or whole.gives_rate else rows.target
     plan = pruned(whole, settings.budget, dtype, settings.to == "c", columns, target)
@@ -140,7 +140,7 @@ def _pruned(
     return plan, {
         "bytes_asked": settings.budget,
         "bytes_whole": weight_bytes(whole, dtype, settings.to == "c"),
-        "chosen_on": "training runs" if rows is not None else "points in the trained box",
+        "chosen_on": where,
         "centres": [whole.centres, plan.centres],
         "terms": [len(whole.names), len(plan.names)],
         "rms_difference": float(np.sqrt(np.mean(off**2))),

@@ -128,6 +128,24 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     return History(np.asarray(time[keep], dtype=np.float64), paths[keep], gyro[keep])
 
 
+def reached_points(plan: Plan, seed: int, box_share: float = 0.25) -> tuple[FloatArray, str]:
+    """Atom values that stand for what a unit meets, shape (n, a), and where they are, in words.
+
+    In the trained box. Memories follow their signal and reach few corners of it, so that with memories most
+    are of a history, and `box_share` as many in the box, which holds what the history happened not to reach.
+    """
+    atoms = box_points(plan, seed)
+    if not any(atom.settles for atom in plan.atoms):
+        return atoms, "points in the trained box"
+    values, full, _ = history(plan, seed).atoms(plan)
+    inside = values[full & ~plan.limited(values, full)[1]]
+    if len(inside) == 0:
+        return atoms, "points in the trained box"
+    some = np.linspace(0, len(inside) - 1, min(POINTS, len(inside))).astype(np.intp)
+    atoms = np.concatenate((atoms[: round(box_share * len(some))], inside[some]))
+    return atoms, "points in the trained box and of ramps through it"
+
+
 def _walk(
     rng: np.random.Generator, count: int, step_s: float, low: float, high: float, speed: float
 ) -> FloatArray:

@@ -14,11 +14,13 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.export.c_float import literal
+from fogml.export.check import training_rows
 from fogml.export.export import export_model
 from fogml.export.plan import Plan
-from fogml.export.points import box_points, history
+from fogml.export.points import box_points, history, reached_points
+from fogml.export.prune import pruned
 from fogml.export.settings import ExportSettings
-from fogml.export.storage import FILE_DTYPES, stored_array
+from fogml.export.storage import FILE_DTYPES, stored_array, weight_bytes
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel
 from fogml.models.card import TrainingRun
@@ -136,6 +138,21 @@ def test_a_byte_budget_is_kept_and_more_bytes_are_no_worse(model_of, tmp_path, n
         assert pruning["rms_difference"] <= pruning["model_deviation"]  # a constant alone leaves that
         errors.append(report["accuracy"]["rms_exported"] if train else pruning["rms_difference"])
     assert errors == sorted(errors, reverse=True)
+
+
+@pytest.mark.parametrize("share", [0.8, 0.6, 0.4])
+def test_terms_of_memories_are_chosen_where_memories_get_to(model_of, share):
+    """Beside the trained box alone, without the training runs, what is left on them falls by a quarter."""
+    whole = Plan.of(model_of("memory"))
+    rows = training_rows(model_of("memory"), whole, [training_run()])
+    drift = whole.value(whole.full_columns(rows.atoms))
+    left = []
+    for points in (box_points(whole, 0), reached_points(whole, 0)[0]):
+        columns = whole.full_columns(points)
+        budget = int(share * weight_bytes(whole, "float32", True))
+        fewer = pruned(whole, budget, "float32", True, columns, whole.value(columns))
+        left.append(np.std(drift - fewer.value(fewer.full_columns(rows.atoms_of(fewer)))))
+    assert left[1] < 0.75 * left[0]
 
 
 def test_a_pruned_model_runs_in_c(model_of, tmp_path):
