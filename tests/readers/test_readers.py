@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -327,3 +328,15 @@ def test_units_stated_as_the_message_says_are_read(tmp_path):
     with h5py.File(tmp_path / "log.h5", "a") as file:
         file["time"].attrs["unit"], file["gyro"].attrs["unit"] = "s", "deg/h"
     np.testing.assert_array_equal(read_run(tmp_path / "log.h5").gyro, GYRO)
+
+
+def test_the_reader_of_the_recipe_gives_its_columns(tmp_path):
+    text = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    code = text.partition("## Add a reader")[2].partition("```python\n")[2].partition("```")[0]
+    held: dict[str, Any] = {}
+    exec(code, held)
+    rows = [f"{t!r}|{g!r}" for t, g in zip(TIME.tolist(), GYRO.tolist(), strict=True)]
+    (tmp_path / "log.bars").write_text("\n".join(["BARS 1", "time:s gyro:deg/h", *rows]))
+    found = held["Bars"](str(tmp_path / "log.bars"), [])
+    assert [(one["name"], one["unit"]) for one in found.told["arrays"]] == [("time", "s"), ("gyro", "deg/h")]
+    np.testing.assert_array_equal(found.arrays, [TIME, GYRO])
