@@ -71,16 +71,14 @@ def explained(found: Inference, cost: float) -> Explained:
     """What a posterior names, at a cost of a false name over a missed one.
 
     What acts may look like a constant far off, at which effects would meet the wrong output. Then they are
-    fitted at the constants beside what acts, and at those that were expected, too; what fits best is told.
+    fitted at the constants that were expected, too, and what fits best is told.
     """
     judged = judge(found)
     probabilities = tuple(at_cost(c.probability, cost) for c in judged.causes)
     named = tuple(c for c, p in zip(judged.causes, probabilities) if p >= NAMED)
     options = [found]
     if found.setting.widened:
-        beside = found.setting.values_of(Foretold.of(found, judged.best.members).posterior.mean)
-        expected = {c.name: c.mean for c in found.setting.constants}
-        options += [found.meeting(values) for values in (beside, expected)]
+        options.append(found.meeting({c.name: c.mean for c in found.setting.constants}))
     told = []
     for one in options:
         cards = cards_of(one, judged)

@@ -10,9 +10,10 @@ import pytest
 from fogml.gap.cards import cards_of
 from fogml.gap.causes import onset
 from fogml.gap.diagnosis import _closed_share, with_epoch
+from fogml.gap.fitted_model import explained
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import infer
-from fogml.gap.model import TwinModel
+from fogml.gap.model import TwinModel, with_effects
 from fogml.gap.planning import next_run as ahead
 from fogml.gap.posterior import _likeliest, judge
 from fogml.gap.scene import Scene
@@ -195,3 +196,53 @@ def test_an_unknown_of_the_angle_is_told_where_the_table_turns_or_the_angle_is_r
     harmonics = list(family.build(rows, scene, {}))[4].columns
     assert harmonics[:, 0] == pytest.approx(np.sin(np.radians(angle)))
     assert harmonics[:, 5] == pytest.approx(np.cos(3.0 * np.radians(angle)))
+
+
+def test_draws_of_what_is_foretold_move_with_constants_and_the_form_of_what_is_named(found):
+    """By finite differences of what is foretold, in the place of its slopes."""
+    foretold = explained(found, 1.0).fit.foretold
+    (form, unknowns), design = foretold.forms["thermal_hysteresis"], foretold.design(1)
+    width = len(foretold.posterior.mean)
+    assert width == design.shape[1] + len(unknowns)
+    step = 1e-3
+    for i in (0, design.shape[1], width - 1):
+        covariance = np.zeros((width, width))
+        covariance[i, i] = step**2
+        told = replace(foretold, posterior=replace(foretold.posterior, covariance=covariance))
+        drawn = told.drawn_on(1, np.random.default_rng(3))
+        moved = foretold.posterior.mean.copy()
+        own = unknowns.copy()
+        if i < design.shape[1]:
+            moved[i] += step
+        else:
+            own[i - design.shape[1]] += step
+        other = replace(
+            foretold,
+            posterior=replace(foretold.posterior, mean=moved),
+            forms={"thermal_hysteresis": (form, own)},
+        )
+        change = other.on(1) - foretold.on(1)
+        steps = change @ drawn / (change @ change)
+        assert 0.6 < steps.std() < 1.5
+        np.testing.assert_allclose(drawn, np.outer(change, steps), atol=0.02 * np.abs(drawn).max())
+
+
+def test_what_is_named_is_foretold_in_the_place_of_what_the_model_has(found):
+    """The model with it replays the run as what is foretold closes the gap."""
+    told = explained(found, 1.0)
+    constants = {c.name: c.value for c in told.fit.constants}
+    twin = with_effects(found.plant, constants, told.fit.effects)
+    for run, rows in enumerate(found.scene.fit):
+        left = rows.gap - told.fit.foretold.on(run)
+        replayed = rows.gap_of(twin)
+        assert np.std(replayed - left) < 0.1 * np.std(rows.gap)
+        assert np.std(left) < 0.7 * np.std(rows.gap)
+
+
+def test_a_cause_in_its_familys_form_comes_with_what_the_model_has_of_it(found):
+    cause = judge(found).causes[0]
+    foretold, rows = Foretold.of(found, cause.members), found.scene.runs[0]
+    declared, had = next(held for held in found.plant.on if held[0].id == cause.ids[0])
+    more = foretold.of_cause(0, cause) - sum(foretold.of_member(0, m) for m in cause.members)
+    made = rows.made(declared, had.amplitude, had.shape, found.setting.values)
+    np.testing.assert_allclose(more, made, atol=1e-9)
