@@ -77,6 +77,8 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
     covariance_ : (k + 1, k + 1)
         Covariance of (intercept, coefficients): for white residuals as fitted here; a drift model puts
         that of the residuals' own noise in its place, which is larger.
+    shrinkage_ : (k + 1,)
+        What the ridge takes off (intercept, coefficients): those without it less those with it.
     cross_validation_ : dict
         With ``ridge="auto"``, mean squared error on left-out folds for each ridge.
     """
@@ -226,16 +228,20 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
         left = rows[:, -1] - rows[:, :-1] @ solution
         self.ridge_ = ridge
         self.rank_ = system.rank
-        self.coef_ = solution[1:] / condensed.scale
-        self.intercept_ = (
-            float(solution[0] + condensed.y_shift - condensed.shift @ self.coef_)
-            if self.fit_intercept
-            else 0.0
-        )
+        self.coef_, self.intercept_ = self._raw(condensed, solution)
+        bare, level = self._raw(condensed, system.solution(0.0))
+        self.shrinkage_ = np.append(level, bare) - np.append(self.intercept_, self.coef_)
         freedom = count - system.effective_parameters(ridge) - int(self.fit_intercept)
         variance = float(left @ left) / freedom if freedom > 0 else 0.0
         self.residual_std_ = float(np.sqrt(variance))
         self.covariance_ = variance * system.unit_covariance(ridge)
+
+    def _raw(self, condensed: Condensed, solution: FloatArray) -> tuple[FloatArray, float]:
+        """Coefficients of raw columns and intercept, of a solution in the condensed frame."""
+        coef = np.asarray(solution[1:] / condensed.scale)
+        if not self.fit_intercept:
+            return coef, 0.0
+        return coef, float(solution[0] + condensed.y_shift - condensed.shift @ coef)
 
 
 class _System:

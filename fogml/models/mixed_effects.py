@@ -10,9 +10,8 @@ with columns :math:`X_g` of groups g of features, the run's own shift :math:`o_r
 twentieth), and white noise. Only :math:`\beta_0 + \sum X_g c_g` compensates: what is a run's own can't be
 known beforehand, so it takes weight from the shared part, and is never subtracted. Sizes are the maximum of
 the evidence times log-normal priors (empirical Bayes: Rasmussen & Williams, Gaussian Processes for Machine
-Learning, 2006, ch. 5; mixed effects: Laird & Ware, Biometrics 38, 1982).
-
-Priors of a mixed-effects model's sizes, and columns whose sizes mean what the priors say.
+Learning, 2006, ch. 5; mixed effects: Laird & Ware, Biometrics 38, 1982). Below, priors of these sizes, and
+columns whose sizes mean what the priors say.
 """
 
 from __future__ import annotations
@@ -217,6 +216,7 @@ def linear_regressor(
     regressor.coef_, regressor.intercept_ = coef, float(intercept)
     regressor.n_features_in_, regressor.ridge_, regressor.rank_ = len(coef), 0.0, len(coef)
     regressor.residual_std_, regressor.covariance_ = residual_std, covariance
+    regressor.shrinkage_ = 0.0 * covariance[0]
     return regressor
 
 

@@ -192,7 +192,8 @@ def noise_covariance(
     """Covariance of (intercept, coefficients), shape (k + 1, k + 1), for noise of the residuals' spectrum.
 
     The sandwich ``G X'CX G'`` of least squares, with C the covariance of the rows' noise at their true times,
-    the mean over the noise models that what the columns leave speaks for.
+    the mean over the noise models that what the columns leave speaks for. What a ridge draws coefficients by
+    is in it as their bias: they scatter less for it.
 
     Parameters
     ----------
@@ -222,7 +223,9 @@ def noise_covariance(
     # Products of some hundred rows: threads within BLAS would only wait for each other.
     with one_thread("blas"):
         noise = noise_of_rows(table)
-        return None if noise is None else _sandwich(table, noise, regressor)
+        if noise is None:
+            return None
+        return _sandwich(table, noise, regressor) + np.outer(regressor.shrinkage_, regressor.shrinkage_)
 
 
 def _sandwich(table: TrainingTable, noise: RowNoise, regressor: LinearRegressor) -> FloatArray:
