@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from fogml.arrays import FloatArray
 from fogml.gap.card_form import Form, Optimum, Root, optimum
@@ -83,7 +84,27 @@ def explained(found: Inference, cost: float) -> Explained:
     for one in options:
         cards = cards_of(one, judged)
         told.append(Explained(one, judged, probabilities, named, cards, fitted_model(one, named, cards)))
-    return max(told, key=lambda option: option.fit.closeness)
+    best = max(told, key=lambda option: option.fit.closeness)
+    return replace(best, judged=replace(judged, unknown=_left_unknown(best)))
+
+
+def _left_unknown(told: Explained) -> float:
+    """Probability that something unknown acts, by what effects out of proportion to their amplitude leave.
+
+    No node of a grid holds such an effect well where it is large, and what nodes leave looks unknown.
+    """
+    found, held = told.found, told.found.field
+    forms = told.fit.foretold.forms.values()
+    if all(form.declared.in_proportion for form, _ in forms):
+        return told.judged.unknown
+    others = [m for m in told.judged.best.members if found.kind(m) == "unknown"]
+    base, beside = (
+        made_beside(found, kept, told.fit.foretold.replaced) for kept in (held.base, held.beside(others))
+    )
+    left = base.data - np.sum([form.made(own) for form, own in forms], axis=0)
+    without, with_others = (replace(kept, data=left).log_evidence for kept in (base, beside))
+    odds = with_others - without + sum(found.search.log_odds[m.family] for m in others)
+    return float(min(told.judged.unknown, expit(odds))) if others else told.judged.unknown
 
 
 def fitted_model(found: Inference, named: Sequence[Cause], cards: Mapping[str, Card]) -> Fit:

@@ -191,6 +191,8 @@ class HeldOut:
             closed = (rec - aft) / gap
             moved = np.zeros(draws)
             if after.members or after.forms:
+                if rec >= aft > self._noises.mean() + Z90 * float(np.std(self._noises)):
+                    note = "what is left is beyond noise; against the twin that is written more may be named"
                 left = (self.rows.gap - after.on(self.run))[:, None] - after.drawn_on(self.run, self._rng)
                 moved = np.array([_square(windows.of(column)) for column in left.T]) - aft
             room = np.maximum(aft - self._rng.choice(self._noises, (draws, draws)), 0.0)

@@ -75,6 +75,7 @@ def test_a_clock_that_is_far_out_is_told_as_far_out(tmp_path, modelled, skew):
     ]
     had = twin.with_effect("logger_skew", modelled) if modelled else twin
     found = diagnose(had, made[:2], made[2:], plan=False)
+    assert found.verdict == "explained"
     named = found.named[0]
     assert named.effect == "logger_skew"
     assert named.amplitude.value == pytest.approx(skew - modelled, abs=0.5)
@@ -86,6 +87,21 @@ def test_a_clock_that_is_far_out_is_told_as_far_out(tmp_path, modelled, skew):
     assert np.sqrt(np.mean(left**2)) < 2e-3 * np.sqrt(
         np.mean((made[2].gyro_deg_h - replay(twin, made[2])) ** 2)
     )
+
+
+def test_what_a_large_cause_hides_is_asked_for_and_found_against_the_twin_that_is_written(tmp_path):
+    """Beside a skew a hysteresis a thousand times smaller is noise, and shows on the held-out run."""
+    twin = load_twin("nominal")
+    acting = twin.with_effect("logger_skew", 2.0).with_effect("thermal_hysteresis", 2.0)
+    made = [simulate(PROGRAMME, acting, sample_s=20.0, seed=s).run for s in range(3)]
+    found = diagnose(twin, made[:2], made[2:], plan=False)
+    assert [f.effect for f in found.named] == ["logger_skew"]
+    assert "more may be named" in found.how_far[0].note
+    found.write_model(TwinModel(twin), tmp_path / "twin.yaml")
+    again = diagnose(load_twin(tmp_path / "twin.yaml"), made[:2], made[2:], plan=False)
+    hysteresis = next(f for f in again.named if f.effect == "thermal_hysteresis")
+    assert hysteresis.amplitude.value == pytest.approx(2.0, abs=0.1)
+    assert "more may be named" not in again.how_far[0].note
 
 
 def test_a_gap_to_a_twin_is_that_of_the_rows():
