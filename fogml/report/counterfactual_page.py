@@ -14,9 +14,9 @@ import plotly.graph_objects as go
 from fogml.escaping import script_data
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Counterfactual
-from fogml.numerals import averages
+from fogml.numerals import averages, unit_words
 from fogml.report import style
-from fogml.report.gap_words import subject_of, title_of, titles, unit_words
+from fogml.report.gap_words import subject_of, title_of, titles
 from fogml.report.page import Drawing, render, template_text
 
 MOST_FACTOR = 3.0

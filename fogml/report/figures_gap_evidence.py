@@ -11,9 +11,9 @@ from plotly.subplots import make_subplots
 
 from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport
 from fogml.intervals import Z90, Z95
-from fogml.numerals import number, with_error
+from fogml.numerals import number, unit_words, with_error
 from fogml.report import style
-from fogml.report.gap_words import STATUS_WORDS, title_of, unit_words
+from fogml.report.gap_words import STATUS_WORDS, title_of
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
 

@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import Any
 
 from fogml.gap.result import Diagnosis, Found
-from fogml.numerals import MISSING, averages, duration, number, percent, with_error
+from fogml.numerals import MISSING, averages, duration, number, percent, unit_words, with_error
 from fogml.report.gap_words import (
     STATUS_WORDS,
     closed_words,
@@ -15,7 +15,6 @@ from fogml.report.gap_words import (
     interval_words,
     probability_words,
     title_of,
-    unit_words,
 )
 from fogml.report.style import regime_word
 from fogml.report.tables import Row, Table, columns_of

@@ -6,10 +6,18 @@ from collections.abc import Sequence
 
 from fogml.gap.result import Diagnosis, Estimate, Found
 from fogml.gap.result_parts import HowFar
-from fogml.numerals import MISSING, averages, listed, number, plural, probability_words, with_error
+from fogml.numerals import (
+    MISSING,
+    averages,
+    listed,
+    number,
+    plural,
+    probability_words,
+    unit_words,
+    with_error,
+)
 from fogml.twin.registry import effects
 
-_UNITS = (("sqrt(h)", "√h"), ("degC2", "°C²"), ("degC", "°C"))
 _HEADLINES = {
     "no_gap": "No gap",
     "explained": "Explained",
@@ -23,13 +31,6 @@ _LIKELY_MEMBERS = 4
 def verdict_words(found: Diagnosis) -> str:
     """The verdict as a word or two."""
     return _HEADLINES[found.verdict]
-
-
-def unit_words(unit: str) -> str:
-    """A card's unit as pages write it; nothing for a pure number."""
-    for spelt, written in _UNITS:
-        unit = unit.replace(spelt, written)
-    return "" if unit == "1" else unit
 
 
 def titles(found: Diagnosis) -> dict[str, str]:

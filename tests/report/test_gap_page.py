@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 
 from fogml.gap.result import HowFar
 from fogml.gap.result_parts import Where
-from fogml.numerals import MISSING, probability_words, with_error
+from fogml.numerals import MISSING, probability_words, unit_words, with_error
 from fogml.report.gap_page import MOST_RUNS_DRAWN, gap_page
 from fogml.report.gap_tables import causes_table, constants_table
-from fogml.report.gap_words import unit_words
 from fogml.twin.registry import effect, effects
 from tests.report.diagnoses import diagnosis, every_diagnosis, hysteresis, series
 from tests.report.pages import Page
