@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from fogml.benchmark.rounds import SEED, TRACKS, Track
+from fogml.benchmark.rounds import SEED, TRACKS, Track, read_round
 from fogml.cli import options
 from fogml.cli.given import argument, option
 from fogml.cli.settings import Settings
@@ -150,12 +150,14 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
 
 def score_and_write(settings: ScoreSettings, terminal: Terminal) -> None:
     """Score a round, write ``score.json`` and its page."""
-    from fogml.benchmark.score import score_round
-    from fogml.report.benchmark_page import benchmark_page, diagnosis_table, drift_table
-
     home = Path(settings.folder())
+    read_round(home)  # what is no round is refused before the scorer loads
+    from fogml.benchmark.score import score_round
+
     with terminal.work("scoring", total=1):
         values = score_round(home, settings.entries, workers=settings.workers)
+    from fogml.report.benchmark_page import benchmark_page, diagnosis_table, drift_table
+
     out = Path(settings.out) if settings.out else home
     with whole_folder(out, shared=True) as staging:
         write_json(staging / "score.json", values, indent=1)

@@ -177,13 +177,13 @@ def answer(
 
 def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     """Score a suite, write ``score.json``, its page and its marks; whether every gate is met."""
+    folder = settings.folder()
+    methods = settings.methods or list(folder.methods())
+    cases = len(folder.names())
     from fogml.blind.score import gate, gather
     from fogml.blind.scoring.values import score_values
     from fogml.report.blind_tables import headline
 
-    folder = settings.folder()
-    methods = settings.methods or list(folder.methods())
-    cases = len(folder.names())
     ledger = Path(settings.ledger) if settings.final else None
     with terminal.work("scoring", total=cases) as work:
         marks = gather(

@@ -12,8 +12,6 @@ from fogml.cli.terminal import UNITS_SHOWN, Terminal, Work, number
 from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
-from fogml.fleet.shared import shared_model
-from fogml.fleet.summary import fleet_json, label_of, told_of
 from fogml.fleet.tasks import DONE, FLEET, Task, full_disk
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.locks import sole_writer
@@ -48,19 +46,20 @@ def write_batch(batch: Mapping[str, Any], folder: Path, name: str) -> None:
 
 def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     """Do every unit's job, write the fleet's results, print them; whether all are done and meet limits."""
-    from fogml.report.fleet_page import fleet_page
-    from fogml.report.spreadsheets import fleet_spreadsheet
-
     if settings.manifest is None:
         raise InputError("no manifest is given; name a CSV or YAML file of units")
-    _check(settings)
     units = read_manifest(settings.manifest)
+    _check(settings)
     tasks = _tasks(settings, units)
     home = Path(settings.out)
     if home.exists() and not home.is_dir():
         raise InputError(f"{home}: is a file, a folder was expected; choose another --out")
     with sole_writer(home), terminal.work("fleet", total=len(tasks)) as work:
         outcomes = _run(settings, tasks, work, terminal)
+    from fogml.fleet.summary import fleet_json
+    from fogml.report.fleet_page import fleet_page
+    from fogml.report.spreadsheets import fleet_spreadsheet
+
     values = finite_json(fleet_json(outcomes, settings.for_units()))
     batch = batch_of(values["units"], home)
     name = Path(settings.manifest).name
@@ -97,7 +96,7 @@ def _tasks(settings: FleetSettings, units: Sequence[Unit]) -> list[Task]:
 
 
 def _check(settings: FleetSettings) -> None:
-    """Check what can be checked before a file is read."""
+    """Check what can be checked before a run is read."""
     from fogml.features.parse import parse_features
     from fogml.models.names import make_model
 
@@ -115,6 +114,8 @@ def _shared(path: str) -> dict[str, Any]:
     values = read_json(Path(path), f"--prior takes a {FLEET}")
     if not isinstance(values, dict) or "shared" not in values:
         raise InputError(f"--prior {path}: tells no shared constants; a {FLEET} of three units or more does")
+    from fogml.fleet.shared import shared_model
+
     shared_model(values["shared"])
     return dict(values["shared"])
 
@@ -149,6 +150,8 @@ def _run(
 
 def _track(tracker: Tracker, outcome: dict[str, Any]) -> None:
     """Tell a tracker of a unit that is done."""
+    from fogml.fleet.summary import label_of
+
     found = outcome["found"]
     worst = found.get("worst") or {}
     tracker.log(
@@ -165,6 +168,8 @@ def _track(tracker: Tracker, outcome: dict[str, Any]) -> None:
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    from fogml.fleet.summary import told_of
+
     rows = []
     for unit in values["units"][:UNITS_SHOWN]:
         label = f"{unit['unit']} {unit['axis']}".strip()

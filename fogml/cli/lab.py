@@ -71,7 +71,12 @@ class RateSettings(Settings):
     job: ClassVar[str] = "fogml.cli.lab_jobs:rate_and_write"
     runs: Annotated[
         list[str],
-        argument("[RUN...]", "Runs on a rate table, with the column rate as commanded.", reads=True),
+        argument(
+            "[RUN...]",
+            "Runs on a rate table, with the column rate as commanded.",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+        ),
     ] = []
     twin: Annotated[
         str | None,
@@ -176,7 +181,10 @@ class AcceptanceSettings(Settings):
         str | None, option("Limits (YAML): customer, document, limits.", metavar="FILE", reads=True)
     ] = None
     noise: Annotated[
-        str | None, option("Static run for noise terms and floor.", metavar="RUN", reads=True)
+        str | None,
+        option(
+            "Static run for noise terms and floor.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
+        ),
     ] = None
     averaging: options.Averaging = Field(100.0, gt=0.0)
     turn_on_band: Annotated[float | None, option("Band that tells the turn-on time.", metavar="DEG/H")] = (

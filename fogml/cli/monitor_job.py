@@ -27,8 +27,6 @@ from fogml.runs.run import Run
 
 def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
     """Keep new runs, judge every unit's, write and print it; whether all were used and no unit changed."""
-    from fogml.report.monitor_page import monitor_page, unit_file, unit_page
-
     if not settings.model:
         raise InputError("no model is given; name its folder, or that of a fleet's results")
     home = Path(settings.out)
@@ -57,6 +55,8 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
         refused=refused,
     )
     values = finite_json(told)
+    from fogml.report.monitor_page import monitor_page, unit_file, unit_page
+
     with terminal.work("drawing"), whole_folder(home, shared=True) as folder:
         write_json(folder / "monitor.json", values, indent=1)
         (folder / "monitor.html").write_text(monitor_page(values), encoding="utf-8")

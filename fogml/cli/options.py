@@ -151,7 +151,13 @@ class LimitSettings(Settings):
         ),
     ] = None
     noise: Annotated[
-        str | None, option("Static run of the unit: its noise makes the floor.", metavar="RUN", reads=True)
+        str | None,
+        option(
+            "Static run of the unit: its noise makes the floor.",
+            metavar="RUN",
+            reads=True,
+            known=SHIPPED_RUNS,
+        ),
     ] = None
 
     @field_validator("limits", mode="before")

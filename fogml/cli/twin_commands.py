@@ -86,10 +86,18 @@ class DiagnoseSettings(Settings):
     ] = []
     held_out: Annotated[
         list[str],
-        option("Run for the final figure; may be repeated.", metavar="RUN", reads=True),
+        option(
+            "Run for the final figure; may be repeated.",
+            metavar="RUN",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+        ),
     ] = []
     noise: Annotated[
-        str | None, option("Static run of the unit, for its noise.", metavar="RUN", reads=True)
+        str | None,
+        option(
+            "Static run of the unit, for its noise.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
+        ),
     ] = None
     twin: options.Twin = "nominal"
     without: Annotated[
