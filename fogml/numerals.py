@@ -134,11 +134,13 @@ def stated(value: float) -> str:
 
 
 def percent(share: float | None) -> str:
-    """A share (0 to 1) in percent; "under 0.1 %" rather than a zero that is none."""
+    """A share (0 to 1) in percent; "under 0.1 %" rather than a zero that is none, below zero too."""
     if share is None or not math.isfinite(share):
         return MISSING
     if 0 < share < 0.001:
         return "under 0.1 %"
+    if -0.001 < share < 0:
+        return "above −0.1 %"
     if 0.999 < share < 1:
         return "over 99.9 %"
     return f"{100 * share:.{0 if share in (0, 1) else 1}f} %".replace("-", "−")

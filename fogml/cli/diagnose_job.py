@@ -18,7 +18,7 @@ from fogml.gap.model import TwinModel
 from fogml.gap.own_simulator import ByColumn, by_column, has_column
 from fogml.gap.result import Diagnosis
 from fogml.gap.units import UnitsDiagnosis, diagnose_units
-from fogml.json_files import write_json
+from fogml.json_files import finite_json, write_json
 from fogml.numerals import with_error
 from fogml.outputs import whole_folder
 from fogml.runs.columns import REPLAYED
@@ -61,9 +61,13 @@ def write_several(
     model: TwinModel,
     write: Callable[[Path, Diagnosis], None],
 ) -> None:
-    """``units.json``, and for each unit a folder with what a diagnosis of it alone would write."""
+    """``units.json``, its page, and for each unit a folder with what a diagnosis of it alone writes."""
+    from fogml.report.units_page import units_page
+
     names = folder_names(list(found.by_unit))
-    write_json(folder / "units.json", found.as_dict() | {"folders": dict(zip(found.by_unit, names))})
+    values = finite_json(found.as_dict() | {"folders": dict(zip(found.by_unit, names))})
+    write_json(folder / "units.json", values)
+    (folder / UNITS_PAGE).write_text(units_page(values, _words(found)), encoding="utf-8")
     for name, own in zip(names, found.by_unit.values()):
         (folder / name).mkdir()
         write(folder / name, own)
@@ -72,15 +76,25 @@ def write_several(
 
 def print_several(found: UnitsDiagnosis, terminal: Terminal) -> None:
     """Each unit's verdict, and what is shared."""
-    for unit, own in found.by_unit.items():
-        named = ", ".join(f"{f.effect} ({f.probability:.2f})" for f in own.named) or "nothing named"
-        terminal.say(f"{unit}: {own.verdict.replace('_', ' ')}; {named}")
+    for unit, words in _words(found).items():
+        terminal.say(f"{unit}: {words}")
     for line in found.lines():
         terminal.say(line)
 
 
+def _words(found: UnitsDiagnosis) -> dict[str, str]:
+    """Each unit's verdict and what is named."""
+    told = {}
+    for unit, own in found.by_unit.items():
+        named = ", ".join(f"{f.effect} ({f.probability:.2f})" for f in own.named) or "nothing named"
+        told[unit] = f"{own.verdict.replace('_', ' ')}; {named}"
+    return told
+
+
 NEXT_RUN = "next-run.yaml"
 """The programme of a run that would tell more, for ``fogml simulate``."""
+UNITS_PAGE = "units.html"
+"""The page that leads to those of several units."""
 WHAT_IF = "what-if.html"
 """The page on which the sizes of effects are moved."""
 
@@ -88,7 +102,7 @@ WHAT_IF = "what-if.html"
 def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagnosis | UnitsDiagnosis:
     """Diagnose, write ``gap.json``, ``gap.html`` and ``twin.yaml``, and print the verdict.
 
-    Of runs of several units each has them in a folder of its own, beside ``units.json``.
+    Of runs of several units each has them in a folder of its own, beside ``units.json`` and its page.
     """
     if not settings.runs:
         raise InputError("no run is given; name the runs to diagnose before --held-out")
@@ -112,6 +126,7 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
                 settings.write_into(folder, "diagnose")
             print_several(several, terminal)
             terminal.result(several.as_dict())
+            terminal.say(f"Written to {settings.out}: open {Path(settings.out) / UNITS_PAGE}")
             return several
         with terminal.work("diagnosing") as work:
             found = diagnose(

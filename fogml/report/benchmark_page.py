@@ -72,16 +72,17 @@ def _verdict(values: Mapping[str, Any]) -> list[str]:
     sentences = []
     if values["drift"]:
         best = _ranked(values)[0]
-        ratio = values["drift"][best]["figures"][ALL]["ratio"]["value"]
-        sentences.append(f"{best} leaves least of the drift: {number(ratio)} of what doing nothing leaves.")
+        ratio = value_text(values["drift"][best]["figures"][ALL]["ratio"])
+        least = " the least of the drift:" if len(values["drift"]) > 1 else ""
+        sentences.append(f"{best} leaves{least} {ratio} of what doing nothing leaves.")
     if values["diagnosis"]:
-        mass = {
-            name: one["figures"][ALL]["mass_on_true"]["value"] for name, one in values["diagnosis"].items()
-        }
-        best = max(mass, key=lambda name: mass[name] if mass[name] is not None else -1.0)
-        if mass[best] is not None:
+        told = {name: one["figures"][ALL]["mass_on_true"] for name, one in values["diagnosis"].items()}
+        mass = {name: one for name, one in told.items() if one["value"] is not None}
+        if mass:
+            best = max(mass, key=lambda name: mass[name]["value"])
+            most = "the most " if len(told) > 1 else ""
             sentences.append(
-                f"{best} puts most probability on the true cause: {number(mass[best])} on average."
+                f"{best} puts {most}probability on the true cause: {value_text(mass[best])} on average."
             )
     return sentences
 

@@ -16,6 +16,7 @@ from fogml.report.blind_tables import (
     open_set_plot,
     reality_words,
     reliability_plot,
+    spanned,
     strata_plot,
     value_text,
     wanted_text,
@@ -149,7 +150,7 @@ def _strata(rows: Sequence[Mapping[str, Any]]) -> Table:
     names.sort(key=lambda name: (name.startswith("over"), not name.startswith("under"), _first(name)))
     shown = [row for row in rows if row["by_stratum"]]
     return Table(
-        columns=(*columns_of("Figure"), *((f"d′ {name}", "", "figure") for name in names)),
+        columns=(*columns_of("Figure"), *((f"d′ {spanned(name)}", "", "figure") for name in names)),
         rows=(
             (
                 row["words"].replace(", d′ > 10", ""),

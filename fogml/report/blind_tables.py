@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -120,10 +121,11 @@ def by_reality_table(parts: Mapping[str, Sequence[Mapping[str, Any]]]) -> Table:
         cells = (_cell(parts[name][place]) for name in names)
         rows.append((row["words"], wanted_text(row), *cells))
     return Table(
-        columns=(*columns_of("Figure | >Wanted"), *((n, "95 % interval; n", "figure") for n in names)),
+        columns=(*columns_of("Figure | >Wanted"), *((n, "95 % interval; n", "figure pair") for n in names)),
         rows=rows,
         caption="n is what a figure rests on. Probability from one half on is a name; a far form that is "
-        "called by its name is right, called unknown it is a miss.",
+        "called by its name is right, called unknown it is a miss. The sentence on top counts the table "
+        "'All figures', which has limits of its own.",
     )
 
 
@@ -133,8 +135,8 @@ def by_form_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     for cell in cells:
         low, high = cell["d_prime"]
         told = (value_text(cell[key]["value"], "percent") for key in _SHOWN)
-        window = f"{number(low)}–{number(high)}"
-        rows.append((cell["reality"], cell["form"] or MISSING, window, str(cell["right"]["n"]), *told))
+        window, form = f"{short(low)}–{short(high)}", spanned(cell["form"] or MISSING)
+        rows.append((cell["reality"], form, window, str(cell["right"]["n"]), *told))
     return Table(
         columns=columns_of(
             "Reality | >Cosine [of the catalogue's best member] | >d′ | >Cases | >Class right | "
@@ -144,6 +146,11 @@ def by_form_table(cells: Sequence[Mapping[str, Any]]) -> Table:
         caption="Cosine of a true effect with the nearest member of the catalogue's form, beside the nominal "
         "constants and after whitening.",
     )
+
+
+def spanned(name: str) -> str:
+    """The name of a bin, such as ``0.8-0.9``, as a page writes it."""
+    return re.sub(r"(?<=\d)-(?=\d)", "–", name)
 
 
 def _cell(row: Mapping[str, Any]) -> str:
@@ -184,11 +191,15 @@ def reliability_plot(bins: Sequence[Mapping[str, Any]], error: float | None) -> 
     )
 
 
-def open_set_plot(curves: Mapping[str, Mapping[str, Sequence[float]]], areas: Mapping[str, Any]) -> Drawing:
-    """True against false positives on the unknown's probability, a line per method."""
+def open_set_plot(
+    curves: Mapping[str, Mapping[str, Sequence[float]]], areas: Mapping[str, Any]
+) -> Drawing | None:
+    """True against false positives on the unknown's probability, a line per method; None without a line."""
+    shown = [(name, curve) for name, curve in curves.items() if len(curve["false_positive"]) > 2]
+    if not shown:
+        return None
     figure = go.Figure()
     figure.add_scatter(x=[0, 1], y=[0, 1], mode="lines", name="chance", line=_CHANCE)
-    shown = [(name, curve) for name, curve in curves.items() if len(curve["false_positive"]) > 2]
     for place, (name, curve) in enumerate(shown):
         figure.add_scatter(
             x=list(curve["false_positive"]),
@@ -204,7 +215,7 @@ def open_set_plot(curves: Mapping[str, Mapping[str, Sequence[float]]], areas: Ma
     figure.update_xaxes(title_text="share of cases without an unknown above the threshold", range=[-0.01, 1])
     figure.update_yaxes(title_text="share of cases with one", range=[0, 1.01])
     style.styled(figure, _HEIGHT)
-    told = ", ".join(f"{name} {number(areas.get(name))}" for name, _ in shown) or "none has one"
+    told = ", ".join(f"{name} {number(areas.get(name))}" for name, _ in shown)
     return Drawing(
         figure,
         alt=f"Open-set curves; area under each: {told}.",
@@ -258,7 +269,7 @@ def strata_plot(rows: Sequence[Mapping[str, Any]]) -> Drawing:
         parts = row["by_stratum"]
         if not parts:
             continue
-        names, values = list(parts), [part["value"] for part in parts.values()]
+        names, values = [spanned(name) for name in parts], [part["value"] for part in parts.values()]
         figure.add_scatter(
             x=names,
             y=values,

@@ -123,9 +123,20 @@ def _environment() -> Environment:
     return environment
 
 
+_LONG = re.compile(r"[^\s_&;]{17,}")
+"""What may be no word of a language: the longest of a page's own has 16 letters."""
+_INTERVAL = re.compile(r"\([^()]*…[^()]*\)(?:; \d+)?")
+
+
 def _breakable(cell: object) -> Markup:
-    """A cell's text; names such as effects' may break after an underscore rather than within a word."""
-    return Markup(str(markup(cell)).replace("_", "_<wbr>"))
+    """A cell's text: a long name breaks after marks or every 12 letters, an interval nowhere."""
+
+    def steps(long: re.Match[str]) -> str:
+        return re.sub(r"([./:\\-]|\w{12})(?=\w)", r"\1<wbr>", long[0])
+
+    told = _INTERVAL.sub(lambda found: found[0].replace(" ", "\u00a0"), str(markup(cell)))
+    parts = re.split(r"(<[^>]*>)", told.replace("_", "_<wbr>"))
+    return Markup("".join(part if part.startswith("<") else _LONG.sub(steps, part) for part in parts))
 
 
 def template_text(name: str) -> Markup:

@@ -198,7 +198,7 @@ def test_the_commands_answer_and_score(made: Path, tmp_path: Path) -> None:
     assert values == json.loads(scored.stdout)
     assert values["drift"]["mean"]["figures"]["all"]["ratio"]["value"] == pytest.approx(1.0)
     page = (tmp_path / "score.html").read_text()
-    assert "cubic leaves least of the drift" in page and "Rules" in page
+    assert "cubic leaves the least of the drift" in page and "Rules" in page
     wrong = runner.invoke(app, ["benchmark", "run", str(made), "--method", "polynomail"])
     assert wrong.exit_code == 2 and "did you mean" in wrong.output
 

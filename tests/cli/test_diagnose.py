@@ -266,6 +266,9 @@ def test_runs_of_different_units(runs, tmp_path, invoke, monkeypatch):
     for folder in told["folders"].values():
         assert {p.name for p in (out / folder).iterdir()} == {"gap.json", "gap.html", "twin.yaml"}
     assert told["shared"][0]["sizes"]["FOG-2"]["value"] == 0.4
+    page = (out / "units.html").read_text(encoding="utf-8")
+    assert set(re.findall(r'href="([^"]*)"', page)) == {"FOG_1/gap.html", "FOG-2/gap.html"}
+    assert "−0.200 … 0.900" in page and "units.html" in said
     assert "the next unit's lies between -0.2 and 0.9 deg/h" in " ".join(said.split())
 
 

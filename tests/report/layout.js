@@ -27,6 +27,20 @@ function (paper) {
       faults.push(words(e) + " is cut by its figure's edge");
     }
   });
+  // A word that is broken within, and an interval; long names may be, and the manual's wide tables.
+  document.querySelectorAll("table th, table td").forEach(function (e) {
+    if (e.closest(".manual")) { return; }
+    var inside = document.createTreeWalker(e, NodeFilter.SHOW_TEXT);
+    for (var text = inside.nextNode(); text; text = inside.nextNode()) {
+      var whole = /(?<![\w./:-])[A-Za-z]{2,16}(?![\w./:-])|\([^()]*…[^()]*\)/g;
+      for (var found = whole.exec(text.data); found; found = whole.exec(text.data)) {
+        var part = document.createRange();
+        part.setStart(text, found.index);
+        part.setEnd(text, found.index + found[0].length);
+        if (part.getClientRects().length > 1) { faults.push("'" + found[0] + "' is broken in " + words(e)); }
+      }
+    }
+  });
   // Texts that are seen, by their boxes; those of one element belong together.
   var boxes = [], walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   for (var node = walker.nextNode(); node; node = walker.nextNode()) {

@@ -22,6 +22,7 @@ from fogml.report.blind_page import blind_page
 from fogml.report.effect_card import catalogue_page, effect_page
 from fogml.report.plan_page import plan_page
 from fogml.report.sweep_page import sweep_page
+from fogml.report.units_page import units_page
 from fogml.runs.run import Run
 from fogml.twin.pictures import allan_curve, card_values, pictures, rate_curves
 from fogml.twin.registry import effects
@@ -104,9 +105,28 @@ def procedure_pages() -> dict[str, str]:
     drawn = [(card_values(one), *pictures(one), rate_curves(one), allan_curve(one)) for one in shown]
     links = {axis: f"{axis}/noise.html" for axis in "xyz"}
     serial = SERIAL.format(7)
+    names = [SERIAL.format(place) for place in range(3)]
+    size = {"value": 0.0312, "se": 0.0041}
+    units = {
+        "units": dict.fromkeys(names, "explained"),
+        "folders": {name: name for name in names},
+        "shared": [
+            {
+                "effect": effect,
+                "probability": 0.93,
+                "sizes": dict.fromkeys(names[:2], size),
+                "mean": size,
+                "spread": 0.002,
+                "next_unit": [-0.21, 0.9],
+                "unit": "deg/h",
+            }
+            for effect in ("thermal_hysteresis", "modulation_amplitude_error")
+        ],
+    }
     return {
         "sweep": sweep_page(written("sweep"), judgement()),
         "plan": plan_page(written("plan")),
+        "units": units_page(units, dict.fromkeys(units["units"], "explained; loop_gain (0.91)")),
         "blind": blind_page(score_values(marks_of(range(1, 41)))),
         "benchmark": benchmark(serial),
         "effect": effect_page(drawn[0][0], [drawn[0][1]], *drawn[0][2:]),

@@ -38,7 +38,7 @@ KINDS = (
         "north",
         "north of a recording",
     ),
-    *("rate", "train with navigation", "axes", "axes accepted"),
+    *("rate", "train with navigation", "axes", "axes accepted", "units"),
     *("axes of train", "axes of inspect", "axes of compare", "manual", "experiment"),
 )
 LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")

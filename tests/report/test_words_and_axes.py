@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import unicodedata
 from decimal import Decimal
 
@@ -13,6 +14,8 @@ from hypothesis import strategies as st
 
 from fogml import numerals as words
 from fogml.pictures import braille, ticks
+from fogml.report.blind_tables import open_set_plot, spanned
+from fogml.report.page import _breakable
 from fogml.report.style import log_axis, rounded_up, time_unit
 from fogml.report.tables import Table, coefficients_table
 
@@ -54,6 +57,7 @@ def test_a_share_that_is_not_zero_is_not_shown_as_zero() -> None:
     assert words.percent(0.0) == "0 %"
     assert words.percent(1e-5) == "under 0.1 %"
     assert words.percent(0.99999) == "over 99.9 %"
+    assert words.percent(-3e-4) == "above −0.1 %"
     assert words.percent(0.123) == "12.3 %"
     assert words.percent(-1.612) == "−161.2 %"
 
@@ -136,3 +140,25 @@ def test_a_curve_of_dots_rises_from_left_to_right() -> None:
     assert [unicodedata.name(sign) for sign in line] == [
         f"BRAILLE PATTERN DOTS-{dots}" for dots in ("67", "24")
     ]
+
+
+def test_a_cell_breaks_between_words_after_marks_and_never_within_an_interval() -> None:
+    def pieces(cell: str) -> list[str]:
+        """What stays on a line whole."""
+        return re.split(r"<wbr>| ", str(_breakable(cell)))
+
+    assert pieces("mean probability on one cause") == ["mean", "probability", "on", "one", "cause"]
+    assert pieces("0.38 (0.24 … 0.60); 12") == ["0.38", "(0.24\u00a0…\u00a00.60);\u00a012"]
+    assert pieces("open unknown.probability:") == ["open", "unknown.", "probability:"]
+    assert pieces("thermal_hysteresis") == ["thermal_", "hysteresis"]
+    assert "".join(pieces("static-20240101T120000Z-rig.csv")) == "static-20240101T120000Z-rig.csv"
+    assert max(map(len, pieces("abcdefghijklmnopqrstuvwxyz" * 2))) <= 12
+
+
+def test_a_curve_of_no_method_is_not_drawn() -> None:
+    flat = {"false_positive": [0.0, 1.0], "true_positive": [0.0, 1.0]}
+    bent = {"false_positive": [0.0, 0.2, 1.0], "true_positive": [0.0, 0.9, 1.0]}
+    assert open_set_plot({"diagnosis": flat}, {}) is None
+    drawing = open_set_plot({"diagnosis": flat, "bic": bent}, {"bic": 0.85})
+    assert drawing is not None and [trace.name for trace in drawing.figure.data] == ["chance", "bic (0.850)"]
+    assert spanned("0.8-0.9") == "0.8–0.9" and spanned("same-twin") == "same-twin"
