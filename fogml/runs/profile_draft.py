@@ -23,6 +23,7 @@ from fogml.runs.profile_parts import SEPARATORS
 from fogml.runs.reader_process import stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS
 from fogml.runs.stamps import stamp_form
+from fogml.yaml_text import parse_yaml
 
 _MOST_ROWS = 200
 _TIME = re.compile(r"time|stamp|clock|zeit|epoch|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
@@ -244,7 +245,7 @@ def _clock(left: list[_Field]) -> list[str]:
     one = growing[0]
     left.remove(one)
     if one.unit is not None and is_accepted("time", one.unit):
-        return [f"  time: {{source: {_quoted(one.source)}, unit: {one.unit}}}"]
+        return [f"  time: {{source: {_quoted(one.source)}, unit: {_quoted(one.unit)}}}"]
     if _DATE.search(one.name) and one.first and _DAYS[0] < np.median(one.numbers) < _DAYS[1]:
         why = "days, as a spreadsheet counts them"
         return [f"  time: {{source: {_quoted(one.source)}, unit: d}}    {_MARK}{why}"]
@@ -264,7 +265,7 @@ def _gyro(one: _Field | None, many: bool) -> str:
         return f"{{source: GYRO, unit: deg/h}}    {_MARK}no column looks like a gyro; name it"
     source = "" if many else f"source: {_quoted(one.source)}, "
     if one.unit is not None and is_accepted("gyro", one.unit):
-        return f"{{{source}unit: {one.unit}}}"
+        return f"{{{source}unit: {_quoted(one.unit)}}}"
     values = one.numbers
     hints = (("deg/h", r"dph|deg_?h"), ("deg/s", r"dps|deg_?s"), ("rad/s", r"rad"))
     unit = next((u for u, hint in hints if re.search(hint, one.name, re.IGNORECASE)), None)
@@ -286,7 +287,7 @@ def _other(one: _Field, face: str | None, used: set[str]) -> str:
     assert spec is not None
     if one.unit is not None and is_accepted(name, one.unit):
         doubt = f"    {_MARK}of the coil's face? else T_case or T_chamber" if guessed else ""
-        return f"  {name}: {{source: {_quoted(one.source)}, unit: {one.unit}}}{doubt}"
+        return f"  {name}: {{source: {_quoted(one.source)}, unit: {_quoted(one.unit)}}}{doubt}"
     values = one.numbers
     warm = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
     unit = "K" if spec.internal == "degC" and warm > _KELVIN else spec.internal
@@ -304,5 +305,7 @@ def _taken(left: list[_Field], is_one: Callable[[_Field], bool]) -> list[_Field]
 
 def _quoted(value: str | int) -> str:
     """A value for YAML."""
-    is_plain = isinstance(value, int) or re.fullmatch(r"[A-Za-z_][\w./]*", value)
+    # Words such as 'no' and 'on' are truth values there.
+    word = isinstance(value, str) and re.fullmatch(r"[A-Za-z_][\w./]*", value)
+    is_plain = parse_yaml(value, value) == value if word else isinstance(value, int)
     return str(value) if is_plain else json.dumps(value, ensure_ascii=False)

@@ -149,3 +149,16 @@ def test_days_of_a_spreadsheet_are_told(tmp_path):
     assert "unit: d}" in profile.read_text() and "as a spreadsheet counts them" in profile.read_text()
     (run,) = import_recording(path, profile)
     np.testing.assert_allclose(run.time, seconds, atol=1e-3)
+
+
+def test_units_and_names_that_yaml_takes_for_something_else_are_read_back(tmp_path) -> None:
+    """A percent sign begins no YAML value, a dimension of 1 is a number there, and 'no' is false."""
+    path, profile = tmp_path / "rig.csv", tmp_path / "profile.yaml"
+    rows = "".join(f"{t},{t / 8},{25 + t / 100},{40 + t / 50},{t % 2},{t}\n" for t in TIME)
+    path.write_text(f"time [s],gyro [deg/h],T_in [degC],humidity [%],compressor [1],no\n{rows}")
+    profile.write_text(draft_profile(path).replace("# keep:", "keep:"))
+    (run,) = import_recording(path, load_profile(profile))
+    direct = read_run(path)
+    for name in ("gyro", "T_in", "humidity", "compressor"):
+        np.testing.assert_allclose(run.columns[name], direct.columns[name], rtol=1e-12)
+    np.testing.assert_array_equal(run.columns["no"], TIME)
