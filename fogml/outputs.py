@@ -19,7 +19,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
-from fogml.errors import FogmlError, InputError
+from fogml.errors import FogmlError, InputError, listed
 from fogml.folders import exchange_whole, has_to_stay, is_folder, nearest_folder
 from fogml.locks import NO_ROOM, FileLock, remove_left_locks, sole_writer, unwritable
 
@@ -31,12 +31,13 @@ _CONTENT, _LOCK = "content", "lock"
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path; rename it to `path` if the block succeeds.
 
-    The temporary name is that of `path`, so writers that look at it behave.
+    The temporary name is that of `path`, so writers that look at it behave. Where `path` is a symbolic link
+    it stays one, and what it leads to is written.
 
     Raises
     ------
     InputError
-        If the folder is missing or can't be written, or `path` is a folder.
+        If the folder is missing or can't be written, or `path` is a folder, a device or a pipe.
     OSError
         If the disk is full, naming `path`.
     """
@@ -46,22 +47,39 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def whole_files(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
-    """As `whole_file`, for several files of one folder that appear together."""
-    for path in map(Path, paths):
+    """As `whole_file`, for several files of one folder that appear together.
+
+    Those that links lead to other folders appear one folder after the other.
+    """
+    outputs = [Path(path) for path in paths]
+    for path in outputs:
         check_is_no_folder(path)
-    shown = Path(paths[0]).parent
-    home = Path(os.path.realpath(shown))
-    with _staging(home, shown) as staging:
-        partials = tuple(staging.content / Path(path).name for path in paths)
-        with staging.named(Path(paths[0]), shown):
-            yield partials
+    places = [Path(os.path.realpath(path)) for path in outputs]
+    if len(set(places)) < len(places):
+        raise InputError(f"{listed([str(path) for path in outputs])}: links to one file; choose another name")
+    with ExitStack() as stack:
+        stagings: dict[Path, _Staging] = {}
+        for path, place in zip(outputs, places):
+            if place.parent not in stagings:
+                shown = place.parent if path.is_symlink() else path.parent
+                staging = stack.enter_context(_staging(place.parent, shown))
+                stack.enter_context(staging.named(path, shown))
+                stagings[place.parent] = staging
+        partials = [stagings[place.parent].content / path.name for path, place in zip(outputs, places)]
+        yield tuple(partials)
+        for partial, place in zip(partials, places):
+            if partial.name != place.name and partial.exists():
+                os.rename(partial, partial.with_name(place.name))
+        for home, staging in stagings.items():
             staging.move_in(home)
 
 
 def check_is_no_folder(path: Path) -> None:
-    """Raise `InputError` if a folder has the name of a file to write."""
+    """Raise `InputError` if a folder, a device or a pipe has the name of a file to write."""
     if path.is_dir():
         raise InputError(f"{path}: is a folder, a file was expected; choose another name")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is no ordinary file; choose another name")
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -58,7 +59,7 @@ class HeldText:
 
     def _unpack(self, path: Path, kind: str, limits: ReadingLimits) -> None:
         with stored_file(path, kind, (), limits) as stored:
-            array = (_sheet if kind == "workbook" else _member)(path, stored)
+            array, *others = (_sheets if kind == "workbook" else _member)(path, stored)
             parts = stored.text(array)
             first = next(parts, b"")
             if kind == "packed":
@@ -70,6 +71,12 @@ class HeldText:
                     f"the hidden sheet {quoted(array.name)} is read, as no sheet that is shown holds a run"
                 )
                 self.findings = (Finding("hidden_sheet", message),)
+            if others := [sheet.name for sheet in others if sheet.name not in stored.told.get("hidden", ())]:
+                message = (
+                    f"the sheet {quoted(array.name)} is read, and {listed(map(quoted, others))} not, which "
+                    "may hold a run too; save it as a file of its own to read it"
+                )
+                self.findings += (Finding("other_sheets", message),)
             try:
                 with self.path.open("wb") as text:
                     text.writelines(chain((first,), parts))
@@ -86,12 +93,15 @@ class HeldText:
             workbook has formulas without values.
         """
         for cell, values in table.columns.items():
-            name = parse_header(cell)[0]
-            is_known = column_spec(name) is not None or name.startswith("gyro_")
-            if is_known and np.count_nonzero(np.isfinite(values)) < min(len(values), 2):
-                self._check_values(f", column '{name}'")
+            self.check_column(parse_header(cell)[0], np.count_nonzero(np.isfinite(values)), len(values))
         named = table.row_name
         return replace(table.noting(self.findings), row_name=lambda i: named(i) if self else "")
+
+    def check_column(self, name: str, filled: int, rows: int) -> None:
+        """As `keeping`, of one column by its name and how many of its rows hold something."""
+        is_known = column_spec(name) is not None or name.startswith("gyro_")
+        if is_known and filled < min(rows, 2):
+            self._check_values(f", column '{name}'")
 
     def _check_values(self, place: str) -> None:
         """Refuse a workbook of formulas without values."""
@@ -106,21 +116,21 @@ class HeldText:
                 )
 
 
-def _sheet(path: Path, stored: StoredFile) -> StoredArray:
-    """The first worksheet with a clock and a gyro, else the first; hidden ones come last."""
+def _sheets(path: Path, stored: StoredFile) -> list[StoredArray]:
+    """The worksheets with a clock and a gyro, else the first of all; hidden ones come last."""
     if not stored.arrays:
         raise InputError(f"{path.name}: holds no cells; a header and samples were expected")
-    sure = (sheet for sheet in stored.arrays if is_sure(next(stored.text(sheet))))
-    return next(sure, stored.arrays[0])
+    sure = [sheet for sheet in stored.arrays if is_sure(next(stored.text(sheet), b""))]
+    return sure or stored.arrays[:1]
 
 
-def _member(path: Path, stored: StoredFile) -> StoredArray:
+def _member(path: Path, stored: StoredFile) -> Sequence[StoredArray]:
     """The only file in an archive."""
     if len(stored.arrays) != 1:
         names = listed(array.name for array in stored.arrays)
         held = f"{len(stored.arrays)} files ({names})" if stored.arrays else "no file"
         raise InputError(f"{path.name}: holds {held}, where one CSV file was expected; unpack it first")
-    return stored.arrays[0]
+    return stored.arrays
 
 
 def _check_text(path: Path, head: bytes) -> None:

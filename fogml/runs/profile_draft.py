@@ -59,6 +59,9 @@ def draft_profile(path: Path) -> str:
     """The text of an import profile (YAML) for a file: what is sure, and what is a guess and why."""
     file = opened(path)
     layout, fields = _of_text(file.path) if file.kind == "csv" else _of_container(path, file.kind)
+    for one in fields if file.within is not None else ():
+        # Without its values another column would be taken for what it is.
+        file.within.check_column(one.name, sum(bool(text.strip()) for text in one.first), len(one.first))
     lines = [
         "schema: fogml.import/1",
         f"description: {_quoted('draft for ' + path.name)}",

@@ -348,3 +348,44 @@ def _add_one(home: Path, times: int) -> None:
             done += 1
         except InputError:
             time.sleep(0.0005)
+
+
+def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path):
+    """As a shell's redirection does; a side file appears beside the link, where it is looked for."""
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "disk" / "kept.csv").write_text("old")
+    link, new = tmp_path / "run.csv", tmp_path / "new.csv"
+    link.symlink_to("disk/kept.csv")
+    new.symlink_to("disk/new-one.csv")
+    for place in (link, new):
+        with whole_file(place) as partial:
+            assert partial.name == place.name
+            partial.write_text("written")
+    with whole_files(link, tmp_path / "run.yaml") as (partial, beside):
+        partial.write_text("again")
+        beside.write_text("facts")
+    with pytest.raises(ValueError), whole_file(link) as partial:
+        partial.write_text("half")
+        raise ValueError
+    assert link.is_symlink() and new.is_symlink()
+    assert tree(tmp_path / "disk") == {"kept.csv": "again", "new-one.csv": "written"}
+    assert (tmp_path / "run.yaml").read_text() == "facts" and (tmp_path / "run.yaml").is_file()
+    assert sorted(os.listdir(tmp_path)) == ["disk", "new.csv", "run.csv", "run.yaml"]
+
+
+def test_what_no_file_can_be_put_in_place_of_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("pipe")
+    (tmp_path / "away").symlink_to("no-folder/run.csv")
+    for name, reason in (
+        ("pipe", "no ordinary file"),
+        ("link", "no ordinary file"),
+        ("away", "no such folder"),
+    ):
+        with pytest.raises(InputError, match=reason), whole_file(tmp_path / name):
+            pass
+    (tmp_path / "same.csv").symlink_to("kept.csv")
+    with pytest.raises(InputError, match="links to one file"):
+        with whole_files(tmp_path / "same.csv", tmp_path / "kept.csv"):
+            pass
+    assert (tmp_path / "pipe").is_fifo() and (tmp_path / "link").is_symlink()

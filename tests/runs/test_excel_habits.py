@@ -146,6 +146,28 @@ def test_a_hidden_sheet_is_read_where_no_other_holds_a_run_and_is_told(tmp_path)
     assert "'data'" in finding.message
 
 
+def test_a_second_sheet_with_a_run_is_told(tmp_path):
+    other = [RUN[0], *([t, g + 100.0, a, b] for t, g, a, b in RUN[1:])]
+    sheets = [
+        ("notes", False, [["Test", "4"]]),
+        ("up", False, RUN),
+        ("down", False, other),
+        ("old", True, other),
+    ]
+    book_of(path := tmp_path / "book.xlsx", sheets)
+    run = read_run(path)
+    np.testing.assert_allclose(run.gyro, GYRO, atol=1e-6)
+    (finding,) = (finding for finding in run.findings if finding.code == "other_sheets")
+    assert "'up' is read, and 'down' not" in finding.message and "'old'" not in finding.message
+
+
+def test_a_draft_takes_no_other_column_for_a_gyro_of_formulas_without_values(tmp_path):
+    rows = [[t, f"=10+0.02*C{at}", a, b] for at, (t, _, a, b) in enumerate(RUN[1:], start=1)]
+    book_of(path := tmp_path / "book.xlsx", [("data", False, [RUN[0], *rows])])
+    with pytest.raises(InputError, match=r"book\.xlsx, column 'gyro': empty, .* formulas without values"):
+        draft_profile(path)
+
+
 @pytest.mark.parametrize(
     ("columns", "place"), [((0,), ", column 'time'"), ((1,), ", column 'gyro'"), ((0, 1, 2, 3), "")]
 )
