@@ -176,7 +176,7 @@ def test_three_positions_tell_no_drift_and_say_so(invoke_json) -> None:
         (("rate",), "give recorded runs, or --twin"),
         (("rate", "--twin", "nowhere.yaml"), "no such twin"),
         (("rate", "--twin", "nominal", "--greatest", -5), "'greatest'"),
-        (("rate", "--twin", "nominal", "run.csv"), "one of the two"),
+        (("rate", "--twin", "nominal", "shipped:thermal-cycle-1-x"), "one of the two"),
         (("north",), "--positions, or --azimuth and --latitude"),
         (("north", "--azimuth", 10), "--azimuth and --latitude"),
         (("north", "--azimuth", 10, "--latitude", 95), "latitude 95"),

@@ -385,7 +385,7 @@ def test_what_no_file_can_be_put_in_place_of_is_refused(tmp_path):
         with pytest.raises(InputError, match=reason), whole_file(tmp_path / name):
             pass
     (tmp_path / "same.csv").symlink_to("kept.csv")
-    with pytest.raises(InputError, match="links to one file"):
-        with whole_files(tmp_path / "same.csv", tmp_path / "kept.csv"):
-            pass
+    both = tmp_path / "same.csv", tmp_path / "kept.csv"
+    with pytest.raises(InputError, match="links to one file"), whole_files(*both):
+        pass
     assert (tmp_path / "pipe").is_fifo() and (tmp_path / "link").is_symlink()
