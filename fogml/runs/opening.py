@@ -71,9 +71,9 @@ class HeldText:
                     f"the hidden sheet {quoted(array.name)} is read, as no sheet that is shown holds a run"
                 )
                 self.findings = (Finding("hidden_sheet", message),)
-            if others := [sheet.name for sheet in others if sheet.name not in stored.told.get("hidden", ())]:
+            if unread := [sheet.name for sheet in others if sheet.name not in stored.told.get("hidden", ())]:
                 message = (
-                    f"the sheet {quoted(array.name)} is read, and {listed(map(quoted, others))} not, which "
+                    f"the sheet {quoted(array.name)} is read, and {listed(map(quoted, unread))} not, which "
                     "may hold a run too; save it as a file of its own to read it"
                 )
                 self.findings += (Finding("other_sheets", message),)
@@ -93,7 +93,7 @@ class HeldText:
             workbook has formulas without values.
         """
         for cell, values in table.columns.items():
-            self.check_column(parse_header(cell)[0], np.count_nonzero(np.isfinite(values)), len(values))
+            self.check_column(parse_header(cell)[0], int(np.isfinite(values).sum()), len(values))
         named = table.row_name
         return replace(table.noting(self.findings), row_name=lambda i: named(i) if self else "")
 
@@ -121,7 +121,7 @@ def _sheets(path: Path, stored: StoredFile) -> list[StoredArray]:
     if not stored.arrays:
         raise InputError(f"{path.name}: holds no cells; a header and samples were expected")
     sure = [sheet for sheet in stored.arrays if is_sure(next(stored.text(sheet), b""))]
-    return sure or stored.arrays[:1]
+    return sure or list(stored.arrays[:1])
 
 
 def _member(path: Path, stored: StoredFile) -> Sequence[StoredArray]:

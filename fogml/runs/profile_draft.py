@@ -59,9 +59,10 @@ def draft_profile(path: Path) -> str:
     """The text of an import profile (YAML) for a file: what is sure, and what is a guess and why."""
     file = opened(path)
     layout, fields = _of_text(file.path) if file.kind == "csv" else _of_container(path, file.kind)
-    for one in fields if file.within is not None else ():
-        # Without its values another column would be taken for what it is.
-        file.within.check_column(one.name, sum(bool(text.strip()) for text in one.first), len(one.first))
+    if file.within is not None:
+        for one in fields:
+            # Without its values another column would be taken for what it is.
+            file.within.check_column(one.name, sum(bool(text.strip()) for text in one.first), len(one.first))
     lines = [
         "schema: fogml.import/1",
         f"description: {_quoted('draft for ' + path.name)}",
@@ -308,7 +309,8 @@ def _taken(left: list[_Field], is_one: Callable[[_Field], bool]) -> list[_Field]
 
 def _quoted(value: str | int) -> str:
     """A value for YAML."""
+    if isinstance(value, int):
+        return str(value)
     # Words such as 'no' and 'on' are truth values there.
-    word = isinstance(value, str) and re.fullmatch(r"[A-Za-z_][\w./]*", value)
-    is_plain = parse_yaml(value, value) == value if word else isinstance(value, int)
-    return str(value) if is_plain else json.dumps(value, ensure_ascii=False)
+    is_plain = re.fullmatch(r"[A-Za-z_][\w./]*", value) and parse_yaml(value, value) == value
+    return value if is_plain else json.dumps(value, ensure_ascii=False)
