@@ -148,18 +148,20 @@ def test_every_parametric_name_is_known():
 @pytest.mark.parametrize(
     "command",
     [
-        ("train", "none.csv", "--test", "none.csv", "--model", "rbf", "--set", "centres=-1"),
-        ("fleet", "none.csv", "--model", "rbf", "--set", "centres=-1"),
-        ("fleet", "none.csv", "--model", "sklearn.svm.SVR", "--set", "kernel=foo"),
+        ("train", "{}/no-run.csv", "--test", "{}/no-run.csv", "--model", "rbf", "--set", "centres=-1"),
+        ("fleet", "{}/units.csv", "--model", "rbf", "--set", "centres=-1"),
+        ("fleet", "{}/units.csv", "--model", "sklearn.svm.SVR", "--set", "kernel=foo"),
     ],
 )
-def test_commands_tell_before_they_read(command):
+def test_commands_tell_before_they_read(command, tmp_path):
     from click.testing import CliRunner
 
     from fogml.cli.main import app
 
-    result = CliRunner().invoke(app, command)
-    assert result.exit_code == 2 and "parameter '" in result.output and "none.csv" not in result.output
+    (tmp_path / "no-run.csv").write_text("no run")
+    (tmp_path / "units.csv").write_text("unit,train,test\nA,no-run.csv,no-run.csv\n")
+    result = CliRunner().invoke(app, [word.format(tmp_path) for word in command])
+    assert result.exit_code == 2 and "parameter '" in result.output and "no-run.csv" not in result.output
 
 
 @pytest.mark.parametrize(
