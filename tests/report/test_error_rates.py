@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from experiments import gap_blind
-from fogml.numerals import percent
+from fogml.numerals import percent, plural
 from fogml.report.gap_page import gap_page
 from fogml.report.gap_tiles import ERROR_RATES, error_rates, error_sentences
 from tests.report.diagnoses import every_diagnosis
@@ -37,7 +37,7 @@ def test_every_page_tells_how_often_such_findings_are_right(verdict: str) -> Non
     assert all(sentence in text for sentence in sentences)
     assert "synthetic cases" in sentences[0] and "development" not in sentences[0]
     false = RATES["figures"]["false_names"]
-    told = f"Of the causes named there, {percent(false['value'])} of {false['n']} names"
+    told = f"Of the causes named there, {percent(false['value'])} of {plural(false['n'], 'name')}"
     assert any(sentence.startswith(told) for sentence in sentences) == bool(found.named)
     assert any("nothing missing" in sentence for sentence in sentences) == (not found.named)
 
