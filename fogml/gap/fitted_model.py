@@ -98,11 +98,11 @@ def _left_unknown(told: Explained) -> float:
     if all(form.declared.in_proportion for form, _ in forms):
         return told.judged.unknown
     others = [m for m in told.judged.best.members if found.kind(m) == "unknown"]
-    base, beside = (
-        made_beside(found, kept, told.fit.foretold.replaced) for kept in (held.base, held.beside(others))
+    made = np.sum([form.made(own) for form, own in forms], axis=0)
+    left = made_beside(found, held.base, told.fit.foretold.replaced).data - made
+    without, with_others = (
+        replace(kept, data=left).log_evidence for kept in (held.base, held.beside(others))
     )
-    left = base.data - np.sum([form.made(own) for form, own in forms], axis=0)
-    without, with_others = (replace(kept, data=left).log_evidence for kept in (base, beside))
     odds = with_others - without + sum(found.search.log_odds[m.family] for m in others)
     return float(min(told.judged.unknown, expit(odds))) if others else told.judged.unknown
 

@@ -159,7 +159,8 @@ class HeldOut:
         models = [replace(m, N=as_much * m.N) for m in drawn]
         self._floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
         self._noises = self._drawn(model, None)
-        level = self._recalibrated - self._noises.mean() > Z90 * float(np.std(self._noises))
+        self._loudest = float(self._noises.mean()) + Z90 * float(np.std(self._noises))
+        level = self._recalibrated > self._loudest
         # Slow noise moves a run's mean more than its shape, which may show a gap where the level doesn't.
         about = self._drawn(model, Fitted(np.ones((len(windows.time), 1)), ordinary=True))
         varied = float(np.var(windows.of(self.rows.gap - recalibrated.on(run))))
@@ -182,7 +183,8 @@ class HeldOut:
         uncertain floor.
         """
         windows, rec, floor = self._windows, self._recalibrated, self._floor
-        aft = _square(windows.of(self.rows.gap - after.on(self.run)))
+        left = self.rows.gap - after.on(self.run)
+        aft = _square(windows.of(left))
         closed, interval, draws = None, None, self._settings.draws
         note = "the recalibrated twin is at the floor within its noise: what is closed can't be told"
         if not self._at_floor:
@@ -191,10 +193,10 @@ class HeldOut:
             closed = (rec - aft) / gap
             moved = np.zeros(draws)
             if after.members or after.forms:
-                if rec >= aft > self._noises.mean() + Z90 * float(np.std(self._noises)):
+                if rec >= aft > self._loudest:
                     note = "what is left is beyond noise; against the twin that is written more may be named"
-                left = (self.rows.gap - after.on(self.run))[:, None] - after.drawn_on(self.run, self._rng)
-                moved = np.array([_square(windows.of(column)) for column in left.T]) - aft
+                drawn_left = left[:, None] - after.drawn_on(self.run, self._rng)
+                moved = np.array([_square(windows.of(column)) for column in drawn_left.T]) - aft
             room = np.maximum(aft - self._rng.choice(self._noises, (draws, draws)), 0.0)
             closing = rec - aft + np.minimum(moved[:, None], room)
             drawn = closing / np.maximum(rec - self._floors[None, :], self._settings.least_gap * gap)
