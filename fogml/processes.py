@@ -9,9 +9,10 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 from types import FrameType
 from typing import Any, Literal, NoReturn, TypeVar
 
@@ -95,6 +96,13 @@ def begin_worker(parent: int | None = None) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, name="fogml parent watch", daemon=True).start()
+
+
+def of_this_package(environment: Mapping[str, str] = os.environ) -> dict[str, str]:
+    """An environment in which a new Python loads the package that runs here, whatever is installed."""
+    kept = environment.get("PYTHONPATH")
+    places = [str(Path(__file__).resolve().parents[1]), *([kept] if kept else [])]
+    return {**environment, "PYTHONPATH": os.pathsep.join(places)}
 
 
 @contextmanager

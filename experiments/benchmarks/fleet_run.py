@@ -31,6 +31,7 @@ from experiments.synthetic_world import cycle
 from fogml import __version__
 from fogml.json_files import write_json
 from fogml.outputs import whole_file
+from fogml.processes import of_this_package
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
@@ -66,7 +67,9 @@ def started(manifest: Path, out: Path) -> subprocess.Popen[bytes]:
     """The fleet's command, in a session of its own."""
     words = [sys.executable, "-m", "fogml", "fleet", manifest.name, *COMMAND, "-o", out.name]
     with out.with_suffix(".log").open("ab") as log:
-        return subprocess.Popen(words, cwd=manifest.parent, stdout=log, stderr=log, start_new_session=True)
+        return subprocess.Popen(
+            words, cwd=manifest.parent, stdout=log, stderr=log, start_new_session=True, env=of_this_package()
+        )
 
 
 def killed(manifest: Path, out: Path, kills: int, rng: Random) -> dict[str, Any]:

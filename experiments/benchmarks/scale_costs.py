@@ -28,6 +28,7 @@ from fogml.json_files import write_json
 from fogml.monitor.record import NUMBERS, TEXTS, RunRecord
 from fogml.monitor.store import open_store
 from fogml.outputs import whole_file
+from fogml.processes import of_this_package
 
 HERE = Path(__file__).parent
 FOUND = HERE / "scale_costs.json"
@@ -58,7 +59,8 @@ def _processors_s() -> float:
 
 def fogml(folder: Path, *words: str) -> None:
     """A command of fogml, in a folder."""
-    subprocess.run([sys.executable, "-m", "fogml", *words], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    command = [sys.executable, "-m", "fogml", *words]
+    subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL, env=of_this_package())
 
 
 def fleet(home: Path, units: int) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from typing import Any
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_file
-from fogml.processes import process_is_alive, process_start
+from fogml.processes import of_this_package, process_is_alive, process_start
 
 PROCESS, ENDED, CANCELLED = "process.json", "ended.json", "cancelled"
 
@@ -74,7 +74,12 @@ def run(folder: Path) -> None:
     command = [sys.executable, "-P", "-m", "fogml", *words]
     with open(folder / "stdout", "wb") as out, open(folder / "stderr", "wb") as err:
         child = subprocess.Popen(
-            command, cwd=folder.parents[1], stdin=subprocess.DEVNULL, stdout=out, stderr=err
+            command,
+            cwd=folder.parents[1],
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=err,
+            env=of_this_package(),
         )
         tell(folder / PROCESS, {**process, "child": child.pid})
         if (folder / CANCELLED).exists():
@@ -140,6 +145,7 @@ class Jobs:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 check=True,
+                env=of_this_package(),
             )
 
     def state(self, name: str) -> str:

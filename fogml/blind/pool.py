@@ -16,6 +16,7 @@ from typing import IO, Any
 from fogml.blind.worker import READY
 from fogml.errors import InputError
 from fogml.outputs import scratch_folder
+from fogml.processes import of_this_package
 
 _KEPT = ("PATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PYTHONPATH", "SYSTEMROOT")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -60,7 +61,7 @@ class Worker:
     ) -> None:
         self._folder = ExitStack()
         self.home = Path(os.path.realpath(self._folder.enter_context(scratch_folder())))
-        environment = {name: os.environ[name] for name in _KEPT if name in os.environ}
+        environment = of_this_package({name: os.environ[name] for name in _KEPT if name in os.environ})
         environment |= dict.fromkeys(_THREADS, str(threads))
         environment |= {"HOME": str(self.home), "TMPDIR": str(self.home), "PYTHONUNBUFFERED": "1"}
         command = [sys.executable, "-m", "fogml.blind.worker", method]
@@ -80,7 +81,8 @@ class Worker:
         if begun is not None:
             begun(self)
         try:
-            self.locks = str(self._next(_START_S)["locks"])
+            told = self._next(_START_S)
+            self.locks, self.code = str(told["locks"]), str(told["code"])
         except WorkerLost as lost:
             self.end()
             raise InputError(f"method '{method}' did not start: {lost}") from None

@@ -220,6 +220,11 @@ def _keep(shared: _Shared) -> None:
                 return
             if worker is None:
                 worker = Worker(plan.method, plan.code, plan.threads, shared.begun)
+                if worker.code != shared.code:
+                    raise InputError(
+                        f"the sources of '{plan.method}' or of fogml changed while cases were answered; "
+                        "answers of this code would stand beside those of another: run it again"
+                    )
             if not _one(shared, worker, name):
                 worker.end()
                 worker = None

@@ -168,10 +168,10 @@ def main(arguments: list[str]) -> int:
     os.dup2(2, 1)
     locks = seal(home, code)
     sys.path[:0] = [str(path) for path in code]
-    from fogml.blind.methods import load_method
+    from fogml.blind.methods import code_state, load_method
 
     method = load_method(arguments[0])
-    _say(answers, {READY: True, "locks": locks})
+    _say(answers, {READY: True, "locks": locks, "code": code_state(arguments[0], *code)})
     for line in sys.stdin:
         _say(answers, _answer(method, home, line))
     return 0

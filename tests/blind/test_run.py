@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+import fogml
 from fogml.blind.folders import BlindFolder
-from fogml.blind.methods import load_method
+from fogml.blind.methods import code_state, load_method
 from fogml.blind.run import RunPlan, check_out_of_reach, run_cases
 from fogml.blind.worker import own_roots
 from fogml.cli.blind import RunSettings
@@ -122,6 +127,30 @@ def test_failures_are_recorded_and_the_rest_goes_on(folder: BlindFolder, tmp_pat
     assert plan.left() == ()
     again = RunPlan(folder, "cheat:ends", name="ends", code=code, retry=True)
     assert again.left() == ("0002", "0003", "0004", "0005")
+
+
+def test_workers_run_the_package_that_starts_them(tmp_path: Path) -> None:
+    own = Path(fogml.__file__).parent
+    shutil.copytree(own, tmp_path / "fogml", ignore=shutil.ignore_patterns("__pycache__", "recordings"))
+    changed = tmp_path / "fogml/gap/diagnosis.py"
+    changed.write_text(changed.read_text() + "\n# another state\n")
+    script = "from fogml.blind.pool import Worker; w = Worker('abstain'); print(w.code); w.end()"
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    told = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert told.stdout.strip() == code_state("abstain", package=tmp_path / "fogml"), told.stderr
+    assert told.stdout.strip() != code_state("abstain")
+
+
+def test_answers_of_code_that_changed_meanwhile_are_refused(
+    folder: BlindFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fogml.blind.run.code_state", lambda *_: "0" * 16)
+    plan = RunPlan(folder, "cheat:ends", code=tmp_path / "code", only=("0001",))
+    with pytest.raises(InputError, match=r"sources .* changed while cases were answered"):
+        run_cases(plan)
+    assert plan.left() == ("0001",)
 
 
 def test_a_case_that_has_changed_is_answered_again(folder: BlindFolder, tmp_path: Path) -> None:
