@@ -133,17 +133,24 @@ def stated(value: float) -> str:
     return f"{value:.10g}".replace("-", "−")
 
 
-def percent(share: float | None) -> str:
-    """A share (0 to 1) in percent; "under 0.1 %" rather than a zero that is none, below zero too."""
+def percent(share: float | None, places: int = 1) -> str:
+    """A share (0 to 1) in percent; "under 0.1 %" rather than a zero that is none, below zero too.
+
+    Examples
+    --------
+    >>> percent(0.0004), percent(0.0004, 0), percent(0.25, 0)
+    ('under 0.1 %', 'under 1 %', '25 %')
+    """
     if share is None or not math.isfinite(share):
         return MISSING
-    if 0 < share < 0.001:
-        return "under 0.1 %"
-    if -0.001 < share < 0:
-        return "above −0.1 %"
-    if 0.999 < share < 1:
-        return "over 99.9 %"
-    return f"{100 * share:.{0 if share in (0, 1) else 1}f} %".replace("-", "−")
+    least = 10.0 ** -(places + 2)
+    if 0 < share < least:
+        return f"under {100 * least:.{places}f} %"
+    if -least < share < 0:
+        return f"above −{100 * least:.{places}f} %"
+    if 1 - least < share < 1:
+        return f"over {100 * (1 - least):.{places}f} %"
+    return f"{100 * share:.{0 if share in (0, 1) else places}f} %".replace("-", "−")
 
 
 def lowest_from(noise: Mapping[str, Any]) -> str:

@@ -1,11 +1,13 @@
 """Numbers as text."""
 
 import math
+import re
+from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fogml.numerals import number_text, short
+from fogml.numerals import number_text, percent, short
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
@@ -22,3 +24,19 @@ def test_a_short_number_is_right_to_its_digits_and_has_no_power_of_ten(value, si
 
 def test_no_number_is_a_dash():
     assert short(None) == "–"
+
+
+@given(st.floats(-2.0, 2.0), st.integers(0, 2))
+def test_a_share_in_percent_reads_back_and_is_never_rounded_to_none_or_all(share, places):
+    text = percent(share, places)
+    number = float(text.removesuffix(" %").split()[-1].replace("−", "-"))
+    assert abs(number - 100.0 * share) <= (1.0 if " " in text[:-2] else 0.501) * 10.0**-places
+    assert (number in (0.0, 100.0)) <= (share in (0.0, 1.0) or share > 1.0)
+
+
+def test_shares_are_written_by_one_function():
+    """A space before the sign everywhere, and no share that is rounded to none or to all."""
+    home = Path(__file__).parent.parent / "fogml"
+    own = re.compile(r":\.\d%\}|\{100(\.0)? \* [^{}]*\} %")
+    files = [path for path in home.rglob("*.py") if path.name != "numerals.py"]
+    assert [str(path) for path in files if own.search(path.read_text("utf-8"))] == []

@@ -16,7 +16,7 @@ from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows, verdict_sentences
-from fogml.numerals import duration, short, to_error, with_error
+from fogml.numerals import duration, percent, short, to_error, with_error
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
@@ -47,7 +47,7 @@ def _print_misalignment(values: dict[str, Any], terminal: Terminal) -> None:
     fixture_se = se.get("fixture_error_deg", [None, None])
     for axis, value, error in zip("xy", values["fixture_error_deg"], fixture_se, strict=True):
         rows.append([f"fixture error {axis}", *_figures(value, error, None), "deg"])
-    level = f"{values['level']:.0%}"
+    level = percent(values["level"], 0)
     terminal.table(
         f"{values['source']}: scale factor and misalignment, four states"
         + (" (synthetic data)" if values["synthetic"] else ""),

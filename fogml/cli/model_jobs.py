@@ -18,7 +18,7 @@ from fogml.cli.runs import note_wrong, open_blocks, open_runs
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.json_files import write_json
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.outputs import whole_folder
 from fogml.runs.findings import dead_words
 from fogml.runs.run import Run
@@ -114,7 +114,7 @@ def _print_compensated(
         f"{values['run']} compensated by {kind}, written to {settings.out}",
         ["flag", "samples", "share"],
         [
-            [f"{flag} {name}", str(count), f"{count / max(rows, 1):.1%}"]
+            [f"{flag} {name}", str(count), f"{percent(count / max(rows, 1))}"]
             for flag, (name, count) in enumerate(zip(_WORDS, counts, strict=True))
         ],
     )

@@ -11,7 +11,7 @@ from fogml.cli.run_commands import ImportSettings, InspectSettings, NoiseSetting
 from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs, tell
 from fogml.cli.terminal import Terminal, number, span
 from fogml.errors import InputError
-from fogml.numerals import duration, lowest_from
+from fogml.numerals import duration, lowest_from, percent
 from fogml.outputs import scratch_folder, whole_file, whole_folder
 from fogml.readers import plain_path
 from fogml.runs.columns import header
@@ -256,7 +256,7 @@ def _print_noise(values: dict[str, Any], terminal: Terminal) -> None:
         [f"{tau:.6g}", number(adev), number(low), number(high)]
         for tau, adev, (low, high) in zip(values["taus_s"], values["adev"], values["ci"], strict=True)
     ]
-    level = f"{values['level']:.0%}"
+    level = percent(values["level"], 0)
     terminal.table(
         f"{values['run']}: Allan deviation, {kind}",
         ["tau [s]", "deviation [deg/h]", f"{level} from", "to"],

@@ -17,7 +17,7 @@ import click
 
 from fogml.escaping import terminal_text, visible
 from fogml.json_files import json_text
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.processes import heed_interrupt
 
 _LINE_EVERY_S = 10.0
@@ -211,7 +211,7 @@ class _Lines:
         text = f"{what}: {_clock(spent)}"
         if self._total and self._done:
             left = spent * (self._total - self._done) / self._done
-            text = f"{what}: {self._done / self._total:.0%}, about {_clock(left)} left"
+            text = f"{what}: {percent(self._done / self._total, 0)}, about {_clock(left)} left"
         click.echo(terminal_text(text), err=True)
 
 

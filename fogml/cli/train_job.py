@@ -209,7 +209,7 @@ def floor_words(run: RunJudgement) -> str:
 
 def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     """The figures of the test runs as a table, then limits and notes."""
-    from fogml.numerals import label, unit_of
+    from fogml.numerals import label, percent, unit_of
     from fogml.report.verdict import own_noise_by, unsettled, worst_run
 
     rows = []
@@ -241,7 +241,7 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
                 terminal.say(f"{run.run}: {label(name)}: {text} [{unit_of(name)}]")
         _say_stability(run, terminal)
         if run.outside_training:
-            terminal.say(f"{run.run}: {run.outside_training:.1%} of the samples outside training")
+            terminal.say(f"{run.run}: {percent(run.outside_training)} of the samples outside training")
         if told := unsettled(run):
             terminal.say(f"{run.run}: {told}")
     spread = judgement.repeatability

@@ -26,7 +26,7 @@ from fogml.models.mixed_effects import OWN_PARTS, MixedEffects, SizePriors, line
 from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.prior import Prior, agreement, posterior
 from fogml.models.table import TrainingTable
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 
@@ -195,11 +195,15 @@ class SharedModel(MixedEffectsModel):
     def _why_alone(self, covered: float) -> str:
         """Why the unit is left to its own runs, which cover so much of the fleet's temperatures."""
         if covered < COVERED:
-            return f"the runs cover {covered:.0%} of the fleet's temperatures, too little to tell an odd unit"
+            return (
+                f"the runs cover {percent(covered, 0)} of the fleet's temperatures, too little to tell "
+                "an odd unit"
+            )
         if self.agreement_ < ODD:
             return (
-                f"this unit is odd: of units like the fleet's, {self.agreement_:.1%} would lie as far out "
-                f"(odd below {ODD:.0%})"
+                f"this unit is odd: of units like the fleet's, {percent(self.agreement_)} would lie "
+                "as far out "
+                f"(odd below {percent(ODD, 0)})"
             )
         return ""
 

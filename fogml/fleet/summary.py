@@ -15,7 +15,7 @@ from fogml.fleet.diagnosis import RULES, line_diagnosis
 from fogml.fleet.shares import discoveries
 from fogml.fleet.tasks import DONE
 from fogml.intervals import SIGMA_PER_MEDIAN
-from fogml.numerals import short
+from fogml.numerals import percent, short
 
 FLEET_SCHEMA = "fogml.fleet/1"
 _OUTLYING = 3.5
@@ -159,7 +159,10 @@ def _why_again(unit: Mapping[str, Any]) -> str:
     if unit["after"] > unit["before"]:
         return "the model does harm on the test run: training and test runs do not tell the same"
     if (unit["outside_training"] or 0.0) > _OUTSIDE:
-        return f"{unit['outside_training']:.0%} of the test run lie outside what was trained: train over more"
+        return (
+            f"{percent(unit['outside_training'], 0)} of the test run lie outside what was trained: "
+            "train over more"
+        )
     one_way = [note for note in unit["notes"] if "moving one way only" in note]
     if one_way:
         return "trained on temperature moving one way only: train on a run that goes up and down"

@@ -14,15 +14,15 @@ from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.posterior import Judgement
 from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Unknown, Verdict
-from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries
+from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries, beyond_noise
 from fogml.gap.where import averages
-from fogml.numerals import short
+from fogml.numerals import percent, probability_words, short
 from fogml.signals.bases import rate
 from fogml.signals.noise_expectation import floor_square
 from fogml.signals.whiteness import whiteness
 from fogml.twin.effect import Effect, NoiseEffect
 
-STAGES = {"other_plant": "thermal", "table": "rig", "readings": "sensor"}
+STAGES = {"other_plant": "thermal", "table": "rig", "readings": "sensor", "reading_times": "sensor"}
 """Stages that causes without a card act on."""
 UNKNOWN_STAGE = "bias"
 """Stage that an unknown cause is booked on where its family says nothing of it."""
@@ -203,21 +203,25 @@ def headline(
     `other_plant` says that the likeliest set holds another flow of heat.
     """
     said, titles = [], found.scene.candidates
+    out = beyond_noise(far)
+    could = f"the fitted runs could show; {out}." if out else "these runs could show."
     if verdict == "no_gap" and other_plant:
         said.append(
             "Heat flows a little otherwise than the model's plant says, or a sensor lags: fit its time "
-            "constants. Nothing beyond that is missing that these runs could show."
+            f"constants. Nothing beyond that is missing that {could}"
         )
     elif verdict == "no_gap":
-        said.append("Nothing is missing that these runs could show.")
+        said.append(f"Nothing is missing that {could}")
     for f in (f for f in shown if f.named):
         title = titles[f.effect].title
         others = f" (or {', '.join(f.others)})" if f.others else ""
         size = f"{short(f.amplitude.value)} {f.amplitude.unit}"
         usual = f", {short(f.times_usual, 2)} times the usual most" if (f.times_usual or 0.0) > 1.0 else ""
-        share = f", {f.share:.0%} of the gap" if f.share is not None else ""
+        share = f", {percent(f.share, 0)} of the gap" if f.share is not None else ""
         look = f"; look at the {f.place}" if f.place else ""
-        said.append(f"{title}{others}: {f.probability:.0%} probable, {size}{usual}{share}{look}.")
+        said.append(
+            f"{title}{others}: {probability_words(f.probability)} probable, {size}{usual}{share}{look}."
+        )
         if f.onset is not None:
             said.append(f"{title} {_since(found, f.onset)}, and not before.")
         if f.grows is not None:
@@ -238,7 +242,7 @@ def headline(
             if n.share >= found.setting.priors.reported.near_share:
                 said.append(
                     f"Nearest known cause: {titles[n.effect].title}, in whatever form, holds "
-                    f"{n.share:.0%} of the gap."
+                    f"{percent(n.share, 0)} of the gap."
                 )
     runs = [found.scene.runs[i].run.name for i in found.scene.in_time]
     first = min((runs.index(s.run) for s in segments), default=0)
@@ -252,7 +256,9 @@ def headline(
         if h.closed is None:
             said.append(f"{h.run}: {h.note}.")
         elif any(f.named for f in shown):
-            said.append(f"{h.run}: {h.closed:.0%} of the gap closes{' — ' + h.note if h.note else ''}.")
+            said.append(
+                f"{h.run}: {percent(h.closed, 0)} of the gap closes{' — ' + h.note if h.note else ''}."
+            )
         elif h.note:
             said.append(f"{h.run}: {h.note}.")
     return tuple(said)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray
+from fogml.numerals import number
 from fogml.pictures import AFTER, BEFORE, Panel, in_time
 
 
@@ -83,6 +85,23 @@ class HowFar:
     closed_ci90: tuple[float, float] | None
     note: str = ""
     unit: str = "deg/h"
+
+    @property
+    def made_worse(self) -> bool:
+        """Whether constants as fitted leave more than those given, by over a twentieth of it."""
+        return self.recalibrated > 1.05 * self.before
+
+
+def beyond_noise(far: Sequence[HowFar]) -> str:
+    """Words of the held-out run where constants alone leave most over noise; empty where none stands out."""
+    out = [item for item in far if item.closed is not None]
+    if not out:
+        return ""
+    most = max(out, key=lambda item: (item.made_worse, item.recalibrated / (item.floor or item.recalibrated)))
+    told = f"on {most.run} the recalibrated twin leaves {number(most.recalibrated)} deg/h"
+    if most.made_worse:
+        told += f", more than the {number(most.before)} of the twin as given,"
+    return f"{told} where noise makes {number(most.floor)}"
 
 
 @dataclass(frozen=True)

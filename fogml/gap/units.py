@@ -23,7 +23,7 @@ from fogml.gap.model import AnyModel
 from fogml.gap.result import Diagnosis, Estimate
 from fogml.gap.search import Explanation
 from fogml.gap.settings import Priors
-from fogml.numerals import short
+from fogml.numerals import probability_words, short
 from fogml.runs.run import Run
 from fogml.signals.restricted import random_effects
 from fogml.twin.twin import Twin
@@ -80,7 +80,7 @@ class UnitsDiagnosis:
         said = []
         for c in self.shared:
             sizes = ", ".join(f"{u} {short(s.value)} ± {short(s.se, 2)}" for u, s in c.sizes.items())
-            line = f"{c.effect}: {c.probability:.0%} probable in all units; {sizes} {c.unit}"
+            line = f"{c.effect}: {probability_words(c.probability)} probable in all units; {sizes} {c.unit}"
             if c.next_unit is not None and c.mean is not None:
                 low, high = c.next_unit
                 line += (

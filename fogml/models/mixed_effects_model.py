@@ -29,7 +29,7 @@ from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import SizePriors, fit_mixed_effects
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
 from fogml.models.weights import intervals_of, weights_of
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.runs.run import Run
 
 AVERAGES = 240
@@ -117,7 +117,7 @@ class MixedEffectsModel(FeatureModel):
     def _fit_notes(self) -> list[str]:
         sizes = ", ".join(f"{name} {short(size, 2)}" for name, size in self.fitted_.sizes.items())
         return [
-            f"{100.0 * self.skill_:.0f} % of the shared part is kept, by what left-out parts confirm",
+            f"{percent(self.skill_, 0)} of the shared part is kept, by what left-out parts confirm",
             f"sizes [deg/h]: {sizes}",
         ]
 

@@ -11,7 +11,7 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.models.folds import dealt_blocks
-from fogml.numerals import number_text
+from fogml.numerals import number_text, percent
 from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
@@ -148,7 +148,7 @@ def without_refilling(
     told = f"{run.name}: {count} rows in which windows fill anew after gaps"
     if share > most:
         return full, (
-            f"{told}, {100.0 * share:.0f} % of all, are in the fit: they pull at coefficients of rates, "
+            f"{told}, {percent(share, 0)} of all, are in the fit: they pull at coefficients of rates, "
             f"which no standard error holds; lose fewer samples, or take wider windows than "
             f"{number_text(max(a.window.length_s for a in features.atoms if a.window is not None))} s",
         )

@@ -37,7 +37,7 @@ from fogml.models.mixed_effects_model import averages_of, composed, offered, sta
 from fogml.models.table import TrainingTable, run_rows
 from fogml.models.trial import fit_candidate
 from fogml.models.weights import intervals_of, weights_of
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.runs.run import Run
 
 STATIC = "cubic in T"
@@ -82,9 +82,7 @@ class Weighed:
         )
         if not any(self.weights.values()):
             return f"no compensation: nothing beats the training mean on parts left out; it leaves {rms}"
-        shares = ", ".join(
-            f"{100.0 * weight:.0f} % {name}" for name, weight in self.weights.items() if weight
-        )
+        shares = ", ".join(f"{percent(weight, 0)} {name}" for name, weight in self.weights.items() if weight)
         return f"made of {shares}: it leaves {rms}"
 
 

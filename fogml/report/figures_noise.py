@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from fogml.arrays import FloatArray
-from fogml.numerals import lowest_from, number
+from fogml.numerals import lowest_from, number, percent
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.style import log_axis
@@ -63,7 +63,7 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
             mode="lines",
             line={"width": 0, "color": style.BLUE},
             fillcolor="rgba(0, 114, 178, 0.20)",
-            name=f"{100 * float(noise.get('level', 0.9)):.0f} % interval",
+            name=f"{percent(float(noise.get('level', 0.9)), 0)} interval",
             hoverinfo="skip",
         )
     shown = _term_lines(figure, noise, taus, adev)

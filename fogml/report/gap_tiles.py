@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.gap.result import Diagnosis
+from fogml.gap.result_parts import beyond_noise
 from fogml.numerals import MISSING, listed, number, percent, plural, probability_words
 from fogml.report.gap_words import (
     cause_words,
@@ -31,6 +32,8 @@ def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
     """Verdict, cause, confidence, what is unknown, and what is closed."""
     kind = {"explained": "met", "no_gap": "met", "unknown": "missed", "partly_explained": "words missed"}
     told = "missed" if does_not_close(found) else kind.get(found.verdict, "")
+    if found.verdict == "no_gap" and beyond_noise(found.how_far):
+        told = ""
     tiles = [Tile("Verdict", verdict_words(found), "", _verdict_note(found), told)]
     tiles += [_cause_tile(found, names), _confidence_tile(found, names)]
     unknown = probability_words(found.unknown.probability)
@@ -43,8 +46,9 @@ def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
 def _verdict_note(found: Diagnosis) -> str:
     if does_not_close(found):
         return "and the gap does not close"
+    out = beyond_noise(found.how_far)
     return {
-        "no_gap": "within the noise",
+        "no_gap": "in the fitted runs; held out, more is left" if out else "within the noise",
         "explained": "each effect alone in its class",
         "ambiguous": "a class of several",
         "partly_explained": "something is left",
@@ -56,7 +60,8 @@ def _cause_tile(found: Diagnosis, names: dict[str, str]) -> Tile:
     named = found.named
     if not named:
         looks = found.unknown.looks_like
-        note = f"what is left {looks}" if looks else "nothing stands out of the noise"
+        quiet = f"nothing stands out of {'the fitted runs' if beyond_noise(found.how_far) else 'the noise'}"
+        note = f"what is left {looks}" if looks else quiet
         return Tile("Cause", "none named", "", note, "wide")
     title = title_of(named[0].effect, names)
     if len(named) > 1:
@@ -112,7 +117,7 @@ def warnings(found: Diagnosis, names: dict[str, str]) -> list[str]:
     elif not found.how_far:
         told.append("No run could be held out: every figure here is of data that the twin was fitted to.")
     for item in found.how_far:
-        if item.recalibrated > _WORSE * item.before:
+        if item.made_worse:
             told.append(
                 f"Constants as fitted make the replay of {item.run} worse than those that were given: "
                 f"{number(item.recalibrated)} deg/h after {number(item.before)}. Its runs may be of another "

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fogml.gap.result import Diagnosis, Estimate, Found
-from fogml.gap.result_parts import HowFar
+from fogml.gap.result_parts import HowFar, beyond_noise
 from fogml.numerals import (
-    MISSING,
     averages,
     listed,
     number,
+    percent,
     plural,
     probability_words,
     unit_words,
@@ -56,7 +56,7 @@ def interval_words(low: float, high: float) -> str:
 
 def closed_words(item: HowFar) -> str:
     """What is closed of the structural gap, in percent."""
-    return MISSING if item.closed is None else f"{100 * item.closed:.0f} %".replace("-", "−")
+    return percent(item.closed, 0)
 
 
 def cause_words(found: Found, names: dict[str, str]) -> str:
@@ -86,6 +86,8 @@ def headline(found: Diagnosis) -> str:
         case "no_gap" if found.suspected:
             causes = " + ".join(cause_words(f, names) for f in found.suspected)
             return f"No gap for certain; suspected: {causes}"
+        case "no_gap" if out := beyond_noise(found.how_far):
+            return f"No cause stands out of the fitted runs; {out}"
         case "no_gap":
             return "No gap: the recalibrated twin and the gyro agree within the noise"
         case "explained":
@@ -141,9 +143,10 @@ def _first(found: Diagnosis, names: dict[str, str]) -> str:
             if leading
             else ""
         )
+        where = " of the fitted runs" if beyond_noise(found.how_far) else ""
         return (
-            f"With its own constants fitted the twin leaves nothing that stands out of the noise: none of "
-            f"{among} is named.{most}"
+            f"With its own constants fitted the twin leaves nothing that stands out of the noise{where}: "
+            f"none of {among} is named.{most}"
         )
     if found.verdict == "unknown" and found.unknown.probability < 0.5:
         likeliest = max(found.evidence, key=lambda e: e.probability)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from fogml.numerals import MISSING, listed, number, plural, stated
+from fogml.numerals import MISSING, listed, number, percent, plural, stated
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import Row, Table, columns_of
@@ -86,7 +86,9 @@ def _result(values: Mapping[str, Any]) -> Table:
     for axis, value, error in zip("xy", values["fixture_error_deg"], errors):
         rows.append((f"Zero error of the fixture, {axis}", number(value, 5), number(error), MISSING, "deg"))
     return Table(
-        columns=columns_of(f"Quantity | >Value | >Standard error | >{values['level']:.0%} interval | Unit"),
+        columns=columns_of(
+            f"Quantity | >Value | >Standard error | >{percent(values['level'], 0)} interval | Unit"
+        ),
         rows=rows,
         caption="The interval of the whole angle is what the joint region of both components spans.",
     )
@@ -184,7 +186,7 @@ def region_figure(values: Mapping[str, Any]) -> Drawing | None:
         fill="toself",
         fillcolor="rgba(0, 114, 178, 0.18)",
         line={"color": style.BLUE, "width": 1.4},
-        name=f"{region['level']:.0%} region",
+        name=f"{percent(region['level'], 0)} region",
     )
     figure.add_scatter(
         x=[values["delta_x_deg"]],
@@ -200,7 +202,7 @@ def region_figure(values: Mapping[str, Any]) -> Drawing | None:
     return Drawing(
         figure,
         alt=(
-            f"Joint {region['level']:.0%} confidence region of the two components about "
+            f"Joint {percent(region['level'], 0)} confidence region of the two components about "
             f"{number(values['delta_x_deg'], 5)} and {number(values['delta_y_deg'], 5)} deg: an ellipse with "
             f"half-axes of {number(long)} and {number(short)} deg."
         ),

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from fogml.numerals import MISSING, averages, number, plural
+from fogml.numerals import MISSING, averages, number, percent, plural
 from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import log_axis
@@ -92,7 +92,7 @@ def importance_bars(study: Mapping[str, Any]) -> Drawing | None:
             y=list(shares),
             orientation="h",
             marker={"color": style.SKY_BLUE},
-            text=[f"\u2002{100.0 * share:.0f} %" for share in shares.values()],
+            text=[f"\u2002{percent(share, 0)}" for share in shares.values()],
             textposition="outside",
             cliponaxis=False,
         )
@@ -100,7 +100,7 @@ def importance_bars(study: Mapping[str, Any]) -> Drawing | None:
     figure.update_xaxes(title_text="share of the error's variation [%]", range=[0, 105])
     figure.update_yaxes(autorange="reversed", showgrid=False)
     style.styled(figure, 110 + 30 * len(shares), bargap=0.35)
-    told = "; ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items())
+    told = "; ".join(f"{name} {percent(share, 0)}" for name, share in shares.items())
     return Drawing(
         figure,
         alt=f"What the held-out error varies by: {told}.",

@@ -12,6 +12,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
+from fogml.numerals import percent
 from fogml.runs.arrival_times import burst_ends, sampling_times
 from fogml.runs.clock_order import in_order
 from fogml.runs.columns import TIME_ON, column_spec, conversion, parse_header
@@ -177,7 +178,7 @@ def _check_dropped(file: str, runs: list[Run], total: int, most_dropped: float) 
         what = "; ".join(f.message for f in dropped)
         raise InputError(
             f"{file}: {REPAIR} would drop {count} of {total} rows ({what}), more than "
-            f"{most_dropped:.0%}: correct the file, or {REPAIR} --repair-anyway drops them"
+            f"{percent(most_dropped, 0)}: correct the file, or {REPAIR} --repair-anyway drops them"
         )
 
 

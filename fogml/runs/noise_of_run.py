@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.runs.noise_series import (
     LOST,
     NoiseSeries,
@@ -225,7 +225,7 @@ def _warnings(
         )
         lost = 1.0 - (run.sample_s / sample_s) ** 0.5
         if lost > 0.5 * LOST:
-            message += f" If rows are lost, N of the gyro itself is {lost:.1%} less."
+            message += f" If rows are lost, N of the gyro itself is {percent(lost)} less."
         warnings.append({"code": "irregular_sampling", "message": message})
     return warnings
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.intervals import Z90
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.runs.noise_series import HOLD_ROWS, NoiseSeries
 from fogml.runs.run import Run
 from fogml.runs.steps import recorded_step
@@ -148,7 +148,7 @@ def rounded_log(series: NoiseSeries, terms: NoiseTerms) -> list[dict[str, str]]:
         return []
     message = (
         f"The output comes in steps of {short(step)} deg/h: if the log rounds to them, and no angle is "
-        f"counted, N holds the rounding too, and that of the gyro itself is {less:.1%} less."
+        f"counted, N holds the rounding too, and that of the gyro itself is {percent(less)} less."
     )
     return [{"code": "rounded_log", "message": message}]
 
@@ -164,7 +164,7 @@ def doubts_of(
                 "code": "model_misfit",
                 "message": (
                     "The noise model does not describe this run: its spectrum is off by "
-                    f"{2.0 * terms.misfit:.1%} where chance explains less (p = "
+                    f"{percent(2.0 * terms.misfit)} where chance explains less (p = "
                     f"{short(terms.fit_p_value, 1)}). "
                     "Intervals are widened by that; look at the plot for where."
                 ),

@@ -20,6 +20,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.intervals import LEVEL, MEDIAN_SIZE
+from fogml.numerals import percent
 from fogml.signals import large
 from fogml.signals.averages import FastNoise, averages_variance, fast_noise
 from fogml.signals.distributions import students_ppf
@@ -140,7 +141,7 @@ class FloorModel:
     def floor(self, averaging_s: float, windows: int, source: str = "the run itself") -> Floor:
         """The floor of so many windows over an averaging time."""
         if self.loud > _NOTICED:
-            source += f" without the {self.loud:.0%} of it that is loud"
+            source += f" without the {percent(self.loud, 0)} of it that is loud"
         measured, its_variance = self.fast.averages_variance(averaging_s, windows)
         squares, errors = [], []
         for model, fit in (*self.fits, *self.slow):

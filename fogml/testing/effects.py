@@ -12,6 +12,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.numerals import percent
 from fogml.testing.effect_inputs import (
     BLOCK_EDGES,
     SCRAMBLED,
@@ -87,7 +88,9 @@ def check_priors(effect: Effect) -> None:
             size = np.abs(drawn) if quantity.signed else drawn
             slack = 1e-9 * max(abs(least), abs(most))
             inside = np.mean((size >= least - slack) & (size <= most + slack))
-            assert inside >= 0.8, f"{owner}: only {inside:.0%} of its {grade} prior lie in the range"
+            assert inside >= 0.8, (
+                f"{owner}: only {percent(float(inside), 0)} of its {grade} prior lie in the range"
+            )
     most_n, most_t = effect.amplitude.navigation[1], effect.amplitude.tactical[1]
     assert most_n <= most_t, f"{effect.id}: a navigation gyro is to have no more of it than a tactical one"
 
@@ -250,7 +253,8 @@ def _check_shape(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
             size, rough = rms(fine), rms(coarse - fine)
             matters = matters or size > 0.0
             assert rough <= SMOOTHNESS * size, (
-                f"{effect.id}: slope against {quantity.name} changes by {rough / size:.0%} with half the step"
+                f"{effect.id}: slope against {quantity.name} changes by {percent(rough / size, 0)} "
+                "with half the step"
             )
         if isinstance(effect, ThermalEffect) and not matters:
             above = _forward(

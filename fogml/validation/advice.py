@@ -10,7 +10,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.intervals import LEVEL
 from fogml.models.box import LEAST_SPAN_DEGC, ways_moved
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.validation.reasons import (
     Grade,
     Reason,
@@ -188,8 +188,9 @@ def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
         yield Reason(
             # What it takes away there all the same, it takes away as it falls back.
             "do_not_use" if mostly and against else "use_with_care",
-            f"{run.outside_training:.0%} of {run.run} is outside of what was trained",
-            f"{run.outside_training:.1%} of {run.run} lies at temperatures or rates that training did not "
+            f"{percent(run.outside_training, 0)} of {run.run} is outside of what was trained",
+            f"{percent(run.outside_training)} of {run.run} lies at temperatures or rates that "
+            "training did not "
             "hold: there the model falls back.",
             "Train over the whole range of use.",
         )
@@ -198,7 +199,8 @@ def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
         yield Reason(
             "use_with_care",
             f"its interval does not hold on {run.run}",
-            f"Its {LEVEL:.0%} interval holds {held:.0%} of the averages of {run.run}: that run is unlike the "
+            f"Its {percent(LEVEL, 0)} interval holds {percent(held, 0)} of the averages of "
+            f"{run.run}: that run is unlike the "
             "training runs.",
             "Train on more runs, this one among them, and judge on a new one.",
         )

@@ -11,7 +11,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.noise_series import rows_at_rest, sample_interval
 from fogml.runs.run import Run
@@ -179,7 +179,8 @@ def out_of_reach(
         return None
     return (
         f"No model can reach the design index of {index:g} deg/h: the noise alone leaves {short(floor)} "
-        f"deg/h rms ({short(low)} to {short(high)}, {LEVEL:.0%}) in {count} averages over {averaging_s:g} s "
+        f"deg/h rms ({short(low)} to {short(high)}, {percent(LEVEL, 0)}) in {count} averages over "
+        f"{averaging_s:g} s "
         f"of {where}"
     )
 

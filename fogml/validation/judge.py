@@ -11,6 +11,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.base import NOT_FULL, OUTSIDE
 from fogml.models.card import runs_of
+from fogml.numerals import percent
 from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
@@ -208,7 +209,8 @@ def judge_run(
     findings = (*run.findings, *seen)
     if outside:
         message = (
-            f"{share:.1%} of the samples lie outside the temperatures and rates that the model was trained on"
+            f"{percent(share)} of the samples lie outside the temperatures and rates that the model was "
+            "trained on"
         )
         findings = (*findings, Finding("outside_training", message, count=outside))
     floor = floor_of_run(run, used, errors.before, averaging_s, noise)

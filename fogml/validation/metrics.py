@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
+from fogml.numerals import percent
 from fogml.runs.run import Run
 from fogml.signals.averages import BlockAverages, block_averages, freedom_of_deviation
 from fogml.signals.distributions import deviation_within
@@ -192,7 +193,8 @@ class RunMetrics:
         if not small:
             return ()
         return (
-            f"{small} turns below {LEAST_SHARE:.0%} of the greatest rate tell nonlinearity and asymmetry; "
+            f"{small} turns below {percent(LEAST_SHARE, 0)} of the greatest rate tell nonlinearity "
+            "and asymmetry; "
             "the largest scale factor error of single turns leaves them out for their noise",
         )
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from fogml.numerals import short
+from fogml.numerals import percent, short
 from fogml.runs.findings import IMPLAUSIBLE
 from fogml.validation.floors import floor_interval
 from fogml.validation.results import RunJudgement
@@ -35,7 +35,7 @@ def still_reason(run: RunJudgement, mostly_still: float, what: str) -> Reason | 
     return Reason(
         "do_not_use" if mostly else "use_with_care",
         f"the output of {run.run} stands still",
-        f"{run.run}: {told}. At {share:.0%} of the samples the output stands still: {how}.",
+        f"{run.run}: {told}. At {percent(share, 0)} of the samples the output stands still: {how}.",
         f"See whether the gyro was connected and switched on, and record {run.run} again.",
     )
 

@@ -128,7 +128,7 @@ def test_a_line_of_a_log_tells_the_time_left(monkeypatch, capsys) -> None:
         work.advance()  # too soon for another line
         work.advance()
     told = capsys.readouterr().err.splitlines()
-    assert told == ["reading: 25%, about 0:05:00 left", "reading: 75%, about 0:01:40 left"]
+    assert told == ["reading: 25 %, about 0:05:00 left", "reading: 75 %, about 0:01:40 left"]
 
 
 def test_a_note_stands_on_a_line_of_its_own_above_the_bar(monkeypatch) -> None:

@@ -16,6 +16,7 @@ from fogml.gap.inference import infer
 from fogml.gap.model import TwinModel, with_effects
 from fogml.gap.planning import next_run as ahead
 from fogml.gap.posterior import _likeliest, judge
+from fogml.gap.reports import STAGES
 from fogml.gap.scene import Scene
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.unknown import unknown_families
@@ -246,3 +247,9 @@ def test_a_cause_in_its_familys_form_comes_with_what_the_model_has_of_it(found):
     more = foretold.of_cause(0, cause) - sum(foretold.of_member(0, m) for m in cause.members)
     made = rows.made(declared, had.amplitude, had.shape, found.setting.values)
     np.testing.assert_allclose(more, made, atol=1e-9)
+
+
+def test_what_looks_like_an_error_of_a_thermometer_acts_at_the_sensor():
+    """Words and stage of an unknown cause stand side by side on the page."""
+    reading = [f.id for f in unknown_families(STANDARD.grids) if "thermometer" in f.words]
+    assert len(reading) == 2 and {STAGES[id] for id in reading} == {"sensor"}

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fogml.gap.result import HowFar
-from fogml.gap.result_parts import Where
+from fogml.gap.result_parts import Where, beyond_noise
 from fogml.numerals import MISSING, probability_words, unit_words, with_error
 from fogml.report.gap_page import MOST_RUNS_DRAWN, gap_page
 from fogml.report.gap_tables import causes_table, constants_table
 from fogml.twin.registry import effect, effects
-from tests.report.diagnoses import diagnosis, every_diagnosis, hysteresis, series
+from tests.report.diagnoses import FLOOR, diagnosis, every_diagnosis, hysteresis, series
 from tests.report.pages import Page
 
 VERDICTS = ("explained", "ambiguous", "partly_explained", "unknown", "no_gap")
@@ -212,6 +212,30 @@ def test_a_name_that_closes_nothing_is_no_explanation() -> None:
     page = gap_page(diagnosis(how_far=(worse,)))
     assert "Named, and the gap does not close on c.csv" in page and "<h1>Explained" not in page
     assert "Constants as fitted make the replay of c.csv worse" in page
+
+
+@pytest.mark.parametrize(
+    ("before", "recalibrated", "closed", "said"),
+    [
+        # A deadband of another size: constants take it up where it acts, and held-out runs pay for it.
+        (
+            0.43,
+            0.58,
+            0.0,
+            "leaves 0.580 deg/h, more than the 0.430 of the twin as given, where noise makes 0.0",
+        ),
+        (0.60, 0.58, 0.0, "on c.csv the recalibrated twin leaves 0.580 deg/h where noise makes 0.0075"),
+        (0.0073, 0.0078, None, ""),
+    ],
+)
+def test_no_gap_is_not_said_of_held_out_runs_that_stand_out_of_noise(
+    before, recalibrated, closed, said
+) -> None:
+    far = HowFar("c.csv", 100.0, before, recalibrated, recalibrated, FLOOR, closed, None)
+    first = tiles(Page(gap_page(diagnosis("no_gap", how_far=(far,)))))
+    assert said in first and beyond_noise((far,)) in first
+    assert ("agree within the noise" in first) == (not said)
+    assert ("No cause stands out of the fitted runs" in first) == bool(said)
 
 
 def test_of_several_held_out_runs_the_worst_is_told() -> None:

@@ -124,7 +124,7 @@ def test_what_lost_rows_add_to_white_noise_is_told():
     columns = {"time": run.time[kept], "gyro": run.columns["gyro"][kept]}
     report = noise_report(Run.from_columns("lossy", **columns))
     (warning,) = report["warnings"]
-    told = re.search(r"as ([0-9.]+) s apart.* itself is ([0-9.]+)% less", warning["message"])
+    told = re.search(r"as ([0-9.]+) s apart.* itself is ([0-9.]+) % less", warning["message"])
     # A tenth of the rows lost: those kept stand for 1/0.9 of their time.
     assert float(told[1]) == pytest.approx(0.1 / 0.9, rel=2e-2)
     assert float(told[2]) == pytest.approx(100.0 * (1.0 - 0.9**0.5), abs=0.4)

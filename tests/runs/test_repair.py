@@ -68,7 +68,7 @@ def test_repair_drops_no_more_than_it_may(tmp_path):
     gyro = np.arange(200.0)
     gyro[::20] = np.nan
     path = file_of(tmp_path, ".csv", np.arange(200.0), gyro)
-    with pytest.raises(InputError, match=r"would drop 10 of 200 rows.*more than 2%.*--repair-anyway"):
+    with pytest.raises(InputError, match=r"would drop 10 of 200 rows.*more than 2 %.*--repair-anyway"):
         read_run(path, repair=True)
     assert len(read_run(path, repair=True, most_dropped=1.0)) == 190
 

@@ -94,8 +94,8 @@ def test_nothing_against_is_use() -> None:
         (lambda: judgement(left=1.0, offset=-2.0), "do_not_use", "takes away less than the noise on b.csv"),
         (lambda: judgement(left=3.0, offset=-5.0), "use_with_care", "less steady than without on b.csv"),
         (lambda: judgement(kind="mean", left=1.0), "do_not_use", "takes away less than the noise on b.csv"),
-        (lambda: judgement(outside=0.1), "use_with_care", "10% of b.csv is outside of what was trained"),
-        (lambda: judgement(outside=0.7), "use_with_care", "70% of b.csv is outside of what was trained"),
+        (lambda: judgement(outside=0.1), "use_with_care", "10 % of b.csv is outside of what was trained"),
+        (lambda: judgement(outside=0.7), "use_with_care", "70 % of b.csv is outside of what was trained"),
         (lambda: judgement(limit=1e-3), "do_not_use", "rms over its limit"),
         (overconfident, "use_with_care", "its interval does not hold on b.csv"),
         (narrow, "do_not_use", "trained at one temperature"),
@@ -162,7 +162,7 @@ def test_a_model_that_is_mostly_outside_and_leaves_most_of_it_is_not_to_be_used(
     alone = advice_on(replace(judgement(left=0.97), design_index=None, limits=()))
     assert (alone.grade, alone.brief) == ("use_with_care", "leaves most of it on b.csv")
     found = advice_on(judged)
-    assert (found.grade, found.brief) == ("do_not_use", "70% of b.csv is outside of what was trained")
+    assert (found.grade, found.brief) == ("do_not_use", "70 % of b.csv is outside of what was trained")
 
 
 def test_a_shift_of_the_power_on_alone_is_no_fault_of_the_model() -> None:

@@ -168,7 +168,7 @@ def test_an_index_is_out_of_reach_only_below_the_least_noise_that_the_floor_allo
     most = 5.0e-3 * np.sqrt(chi2.ppf(0.95, count) / count)
     assert out_of_reach(1.001 * least, [floor], [count], 600.0, "a.csv") is None
     told = out_of_reach(0.999 * least, [floor], [count], 600.0, "a.csv")
-    assert f"leaves 0.003 deg/h rms ({least:.3g} to {most:.3g}, 90%)" in told
+    assert f"leaves 0.003 deg/h rms ({least:.3g} to {most:.3g}, 90 %)" in told
 
 
 def test_an_index_below_the_floor_is_said_at_once(runs):
@@ -176,7 +176,7 @@ def test_an_index_below_the_floor_is_said_at_once(runs):
     found = train_until_index(runs[:2], 0.01, model="polynomial")
     assert not found.met and found.trials == ()
     assert "No model can reach the design index of 0.01" in found.summary()
-    said = re.search(r"leaves (\S+) deg/h rms \((\S+) to (\S+), 90%\)", found.summary())
+    said = re.search(r"leaves (\S+) deg/h rms \((\S+) to (\S+), 90 %\)", found.summary())
     floor, low, high = (float(value) for value in said.groups())
     assert floor == pytest.approx(0.1 / np.sqrt(50), rel=0.05) and low < 0.1 / np.sqrt(50) < high
     judged = judge(found.model, runs[:2], runs[2], design_index=0.01)

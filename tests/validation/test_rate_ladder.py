@@ -140,4 +140,4 @@ def test_slow_turns_are_left_out_of_the_largest_error_of_single_turns_and_that_i
     noise = np.random.default_rng(0).standard_normal(len(run))
     found = metrics.figures(noise + DEG_H * run.rate * 20e-6)
     assert found.scale_factor_error_largest == pytest.approx(20.0, abs=2.0)
-    assert "8 turns below 2% of the greatest rate" in metrics.notes[0]
+    assert "8 turns below 2 % of the greatest rate" in metrics.notes[0]
