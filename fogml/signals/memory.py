@@ -64,7 +64,7 @@ class Lag:
         self._sample_s = sample_s
         self._gap_s = longest_gap_s(time_constant_s, sample_s)
         self._needed_s = needed_s(EXPONENTIAL_SPAN * time_constant_s, sample_s)
-        self._start = self._last_time = self._last_x = self._state = float("nan")
+        self._start = self._last_time = self._last_x = self._behind = float("nan")
         self._last_step = -1.0
 
     def push(self, time: FloatArray, x: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -81,8 +81,8 @@ class Lag:
             if low:
                 self._start, self._last_time = time[low], float("nan")
             part = slice(low, high)
-            before = (self._last_time, self._last_x, self._state, self._last_step)
-            values[part], self._state, self._last_step = lag_kernel(time[part], x[part], self._tau, *before)
+            before = (self._last_time, self._last_x, self._behind, self._last_step)
+            values[part], self._behind, self._last_step = lag_kernel(time[part], x[part], self._tau, *before)
             settled[part] = time[part] - self._start >= self._needed_s
             self._last_time, self._last_x = time[high - 1], x[high - 1]
         return values, settled

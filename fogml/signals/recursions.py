@@ -24,37 +24,39 @@ def lag_kernel(
     tau: FloatArray,
     last_time: float,
     last_x: float,
-    state: float,
+    behind: float,
     last_step: float = -1.0,
 ) -> tuple[FloatArray, float, float]:
-    """First-order lag of x, exact for x linear between samples; the last state and step [s] as well.
+    """First-order lag y of x, exact for x linear between samples; the last y - x and step [s] as well.
 
-    ``tau dy/dt = x - y``; `tau` [s] has shape (n,) or (1,) for a constant. `last_time`, `last_x`, `state`
-    and `last_step` belong to the sample before the first one; a NaN `last_time` starts at rest.
+    ``tau dy/dt = x - y``; `tau` [s] has shape (n,) or (1,) for a constant. `last_time`, `last_x`, `behind`
+    (y - x) and `last_step` belong to the sample before the first one; a NaN `last_time` starts at rest.
     """
     n = len(x)
     out = np.empty(n)
+    if n == 0:
+        return out, behind, last_step
     constant = len(tau) == 1
-    before_t, before_x, y = last_time, last_x, state
+    rests = math.isnan(last_time)
+    before_t, before_x = (time[0], x[0]) if rests else (last_time, last_x)
     step_known, decay, weight = last_step, math.nan, 0.0
-    for i in range(n):
-        if math.isnan(before_t):
-            y = x[i]
-        else:
-            step = time[i] - before_t
-            # Steps that differ by the rounding of their times are one.
-            if abs(step - step_known) > _ROUNDED * abs(time[i]):
-                step_known, decay = step, math.nan
-            if not constant or math.isnan(decay):
-                ratio = step_known / (tau[0] if constant else tau[i])
-                decay = math.exp(-ratio)
-                # Share of the newest input in the ramp-invariant step.
-                weight = 1.0 + math.expm1(-ratio) / ratio if ratio > 1e-9 else 0.5 * ratio
-            # In differences, so that a constant x at rest stays exactly that.
-            y = before_x + decay * (y - before_x) + weight * (x[i] - before_x)
-        out[i] = y
+    if rests:
+        # In differences, a constant x at rest stays exactly that.
+        out[0], behind = x[0], 0.0
+    for i in range(1 if rests else 0, n):
+        step = time[i] - before_t
+        # Steps that differ by the rounding of their times are one.
+        if abs(step - step_known) > _ROUNDED * abs(time[i]):
+            step_known, decay = step, math.nan
+        if not constant or math.isnan(decay):
+            ratio = step_known / (tau[0] if constant else tau[i])
+            decay = math.exp(-ratio)
+            # Share of the newest input that the ramp-invariant step leaves behind.
+            weight = -math.expm1(-ratio) / ratio if ratio > 1e-9 else 1.0 - 0.5 * ratio
+        behind = decay * behind - weight * (x[i] - before_x)
+        out[i] = x[i] + behind
         before_t, before_x = time[i], x[i]
-    return out, y, step_known
+    return out, behind, step_known
 
 
 @kernel()

@@ -11,7 +11,7 @@ in the order of the catalogue. Noise is added to that, then comes the logger.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
 
@@ -52,8 +52,8 @@ class ChainOutput:
     output
         The gyro's output before noise and logger [deg/h], shape (n,).
     contributions
-        Part of the output that each effect makes up [deg/h], each of shape (n,), and ``nominal``
-        for the rest; they add to `output`. Empty unless asked for.
+        Part of the output that each effect asked for makes up [deg/h], each of shape (n,), and ``nominal``
+        for what no effect makes up; all of them add to `output`.
     """
 
     output: FloatArray
@@ -71,7 +71,7 @@ def through_chain(
     nominal_inputs: Inputs,
     *,
     signature: Signature = plain_signature,
-    contributions: bool = False,
+    contributions: Collection[str] = (),
     trusting: bool = False,
 ) -> ChainOutput:
     """The gyro's output for inputs, whole or block by block with the same memory.
@@ -87,7 +87,7 @@ def through_chain(
     signature
         Where signatures come from.
     contributions
-        Whether to keep each effect's part.
+        Effects, and ``nominal``, whose part is kept.
     trusting
         Whether the temperatures are measured ones: what sensors falsify or don't show is then added
         to first order.
@@ -96,27 +96,28 @@ def through_chain(
     rate = inputs.input_rate_deg_h
     scale = 1.0 + 1e-6 * scale_factor_ppm(nominal_inputs, twin.nominal)
     bias = bias_deg_h(nominal_inputs, twin.nominal)
-    if contributions:
+    if "nominal" in contributions:
         parts["nominal"] = scale * rate + bias
     rig: dict[str, FloatArray] = {}
     table_rate = rate
     for declared, setting in twin.on:
         if isinstance(declared, RigEffect):
             small = signature(declared, setting, inputs)
-            rig[declared.id] = declared.added_rate(small, inputs, setting.amplitude, **setting.shape)
-            rate = rate + rig[declared.id]
+            turned = declared.added_rate(small, inputs, setting.amplitude, **setting.shape)
+            rate = rate + turned
+            if declared.id in contributions:
+                rig[declared.id] = turned
         elif isinstance(declared, ScaleFactorEffect):
             ppm = setting.amplitude * signature(declared, setting, inputs)
             scale += 1e-6 * ppm
-            if contributions:
+            if declared.id in contributions:
                 parts[declared.id] = 1e-6 * ppm * table_rate
         elif _adds(declared):
             added = setting.amplitude * signature(declared, setting, inputs)
             bias += added
-            if contributions:
+            if declared.id in contributions:
                 parts[declared.id] = added
-    if contributions:
-        parts |= {id: scale * added for id, added in rig.items()}
+    parts |= {id: scale * turned for id, turned in rig.items()}
     output = scale * rate
     output += bias
     if trusting:
@@ -128,7 +129,7 @@ def through_chain(
             ):
                 before = output
                 output = declared.apply(output, inputs, setting.amplitude, **setting.shape)
-                if contributions:
+                if declared.id in contributions:
                     parts[declared.id] = output - before
     return ChainOutput(output, parts)
 

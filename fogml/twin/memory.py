@@ -32,8 +32,8 @@ class Memory:
             return np.empty(0)
         tau = np.atleast_1d(np.asarray(time_constant, dtype=np.float64))
         before = self._states.get(key, (_NAN, _NAN, _NAN, -1.0))
-        out, state, step = lag_kernel(time, np.asarray(x, dtype=np.float64), tau, *before)
-        self._states[key] = (float(time[-1]), float(x[-1]), float(state), float(step))
+        out, behind, step = lag_kernel(time, np.asarray(x, dtype=np.float64), tau, *before)
+        self._states[key] = (float(time[-1]), float(x[-1]), float(behind), float(step))
         return np.asarray(out)
 
     def play(self, key: str, x: FloatArray, half_width: float) -> FloatArray:

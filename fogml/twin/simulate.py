@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
 from fogml.twin.world import Samples, World
 
+Done = TypeVar("Done")
 DEFAULT_COLUMNS = (
     "T_in",
     "T_out",
@@ -112,7 +113,9 @@ def simulate(
     kept: dict[str, FloatArray] = {}
     kept_truth: dict[str, FloatArray] = {}
     rows = 0
-    for recorded, true in _blocks(world):
+
+    def keep(recorded: dict[str, FloatArray], true: Truth | None) -> None:
+        nonlocal rows
         count = len(recorded["time"])
         for target, block in ((kept, recorded), (kept_truth, true.columns() if true else {})):
             for name, values in block.items():
@@ -120,6 +123,9 @@ def simulate(
                 if whole is not values:
                     whole[rows : rows + count] = values
         rows += count
+
+    for _ in _blocks(world, keep):
+        pass
     if not rows:
         raise _never_on(world)
     columns_kept = {name: values[:rows] for name, values in kept.items()}
@@ -166,20 +172,19 @@ def write_world(
         truth_writer = None
         if truth_path is not None:
             truth_writer = stack.enter_context(BlockWriter(truth_path))
-        # Writing takes as long as the rest: a block is written beside the next one's work.
-        beside = stack.enter_context(ThreadPoolExecutor(max_workers=1))
-        pending, left = None, len(world.timeline)
-        for recorded, true in _blocks(world):
-            if pending is not None:
-                pending.result()
-            if len(recorded["time"]):
-                pending = beside.submit(_write, writer, truth_writer, recorded, true, world.gyro_unit)
-                rows += len(recorded["time"])
+
+        def write(recorded: dict[str, FloatArray], true: Truth | None) -> int:
+            count = len(recorded["time"])
+            if count:
+                _write(writer, truth_writer, recorded, true, world.gyro_unit)
+            return count
+
+        left = len(world.timeline)
+        for count in _blocks(world, write):
+            rows += count
             if progress is not None:
                 progress(min(BLOCK_ROWS, left))
                 left -= min(BLOCK_ROWS, left)
-        if pending is not None:
-            pending.result()
         if not rows:
             raise _never_on(world)
     return rows
@@ -247,12 +252,16 @@ def world_of(
     return World(programme, unit, sample_s, seed, names, stated, truth, before, storage)
 
 
-def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]]:
-    """Recorded columns, and the truth, block by block."""
+def _blocks(world: World, then: Callable[[dict[str, FloatArray], Truth | None], Done]) -> Iterator[Done]:
+    """What `then` makes of the recorded columns, and of the truth, block after block."""
     blocks = world.samples(BLOCK_ROWS)
+
+    def record(samples: Samples, chain: ChainOutput) -> Done:
+        return then(*_recorded(world, samples, chain))
+
     if len(world.timeline) <= BLOCK_ROWS:
         # A thread takes longer to start than a single block to work out.
-        yield from (_recorded(world, samples, world.output(samples)) for samples in blocks)
+        yield from (record(samples, world.output(samples)) for samples in blocks)
         return
     # Beside a block's output, the longest part: what acts on the next, what is recorded of the one before.
     with ThreadPoolExecutor(max_workers=2) as beside:
@@ -262,7 +271,7 @@ def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]
             chain = world.output(samples)
             if behind is not None:
                 yield behind.result()
-            behind = beside.submit(_recorded, world, samples, chain)
+            behind = beside.submit(record, samples, chain)
         if behind is not None:
             yield behind.result()
 

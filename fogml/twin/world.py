@@ -194,9 +194,10 @@ class World:
 
     def output(self, samples: Samples) -> ChainOutput:
         """The chain's output for the next block, with contributions where they are asked for."""
-        given = through_chain(self.twin, samples.inputs, samples.inputs, contributions=True)
+        asked = [id for id in ("nominal", *self.twin.settings) if self.truth or not self._acted.get(id)]
+        given = through_chain(self.twin, samples.inputs, samples.inputs, contributions=asked)
         self._note(given.contributions)
-        return given if self.truth else ChainOutput(given.output, {})
+        return given
 
     def logged(self, samples: Samples, output: FloatArray) -> FloatArray:
         """The output as recorded."""

@@ -92,7 +92,8 @@ def test_stages_go_in_order(inputs):
 def test_contributions_add_up(inputs, everything):
     # Jumps of hundreds of deg/s would hide everything else.
     everything = everything.without_effect("fringe_jump")
-    chain = through_chain(everything, fresh(inputs), fresh(inputs), contributions=True)
+    asked = ["nominal", *everything.settings]
+    chain = through_chain(everything, fresh(inputs), fresh(inputs), contributions=asked)
     outside = SensorEffect | LoggerEffect | NoiseEffect
     wanted = {"nominal"} | {
         d.id
@@ -105,6 +106,9 @@ def test_contributions_add_up(inputs, everything):
     size = np.abs(chain.output).max()
     np.testing.assert_allclose(total, chain.output, rtol=0.0, atol=1e-12 * size)
     assert not through_chain(everything, fresh(inputs), fresh(inputs)).contributions
+    one = through_chain(everything, fresh(inputs), fresh(inputs), contributions=["shupe_mohr"]).contributions
+    assert set(one) == {"shupe_mohr"}
+    np.testing.assert_array_equal(one["shupe_mohr"], chain.contributions["shupe_mohr"])
 
 
 def test_blocks_give_the_whole(inputs, everything):
