@@ -159,7 +159,7 @@ def _figure(values: Mapping[str, Any]) -> Markup | None:
 
 
 def _runs(values: Mapping[str, Any]) -> Table:
-    columns = columns_of("Run | Started | >Length [h] | >T from [°C] | >to [°C] | >Outside training")
+    columns = "Run | Started | >Length [h] | >T from [°C] | >to [°C] | >Outside training"
     rows = [
         (
             run["run"],
@@ -240,9 +240,7 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
 
 def _distribution(values: Mapping[str, Any]) -> Table:
     parts = ("least", "q10", "median", "q90", "largest")
-    columns = columns_of(
-        "Quantity | Unit | >Units tested | >Least | >10 % | >Median | >90 % | >Largest | >Limit | >Over"
-    )
+    columns = "Quantity | Unit | >Units tested | >Least | >10 % | >Median | >90 % | >Largest | >Limit | >Over"
     rows = [
         (
             one["name"],

@@ -8,7 +8,7 @@ from typing import Any
 from fogml.numerals import MISSING, averages, duration, number
 from fogml.report.acceptance_page import VERDICTS, limit_words
 from fogml.report.page import render
-from fogml.report.tables import Table, columns_of
+from fogml.report.tables import Table
 from fogml.report.verdict import GRADES
 
 PAGES = {
@@ -33,7 +33,7 @@ def axes_page(values: Mapping[str, Any], links: Mapping[str, str]) -> str:
     """
     command, axes = values["command"], values["axes"]
     kicker, headings, row = _SHOWN[command]
-    table = Table(columns_of(f"Axis | {headings}"), ((axis, *row(told)) for axis, told in axes.items()))
+    table = Table(f"Axis | {headings}", ((axis, *row(told)) for axis, told in axes.items()))
     return render(
         "axes.html",
         title=f"fogml {command} – axes {', '.join(axes)}",

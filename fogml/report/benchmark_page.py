@@ -106,7 +106,7 @@ def drift_table(values: Mapping[str, Any]) -> Table | None:
                 str(told["failed"]),
             )
         )
-    columns = columns_of(
+    columns = (
         "Entry | >>Rms / nothing | >Worst | >>Harmful | >>Coverage of 90 % | >>Width / nothing | "
         ">Model [byte] | >Failed"
     )

@@ -108,10 +108,8 @@ def _figures(rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Ta
             "their kind alone."
         )
     return Table(
-        columns=columns_of(
-            "Figure | >Reached [95 % interval] | >Wanted | Outcome | >n | >Cases | >Prototype"
-        ),
-        rows=(
+        "Figure | >Reached [95 % interval] | >Wanted | Outcome | >n | >Cases | >Prototype",
+        (
             (
                 row["words"],
                 figure_text(row),
@@ -173,10 +171,7 @@ def _part(row: Mapping[str, Any], part: Mapping[str, Any] | None) -> str:
 
 
 def _by_kind(values: Mapping[str, Any]) -> Table:
-    return Table(
-        columns=columns_of("Kind | >Cases"),
-        rows=((kind_words(kind), str(n)) for kind, n in values["kinds"].items()),
-    )
+    return Table("Kind | >Cases", ((kind_words(kind), str(n)) for kind, n in values["kinds"].items()))
 
 
 def _left_out(parts: Sequence[Mapping[str, Any]]) -> Table:
@@ -198,11 +193,9 @@ def _left_out(parts: Sequence[Mapping[str, Any]]) -> Table:
             )
         )
     return Table(
-        columns=columns_of(
-            "Unknown | Kind | >Cases | >d′ [median] | >Seen as unknown | >Wrong name | Wrong names | "
-            "Relatives named"
-        ),
-        rows=rows,
+        "Unknown | Kind | >Cases | >d′ [median] | >Seen as unknown | >Wrong name | Wrong names | "
+        "Relatives named",
+        rows,
         caption="A relative's best-fitted signature can't be told from the unknown: its name is not wrong.",
     )
 
@@ -229,8 +222,8 @@ def _worst(cases: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
 
 def _gates(gates: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
-        columns=columns_of("Gate | >Limit | >Reached | Outcome"),
-        rows=(
+        "Gate | >Limit | >Reached | Outcome",
+        (
             (
                 one["key"],
                 f"{'≥' if one['at_least'] else '≤'} {stated(one['limit'])}",
@@ -244,8 +237,8 @@ def _gates(gates: Sequence[Mapping[str, Any]]) -> Table:
 
 def _uses(uses: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
-        columns=columns_of("When [UTC] | >Seed | >Cases | Methods | Hash of the truth [first digits]"),
-        rows=(
+        "When [UTC] | >Seed | >Cases | Methods | Hash of the truth [first digits]",
+        (
             (u["when"], str(u["seed"]), str(u["cases"]), listed(list(u["figures"]), 9), u["truth"][:12])
             for u in uses
         ),
@@ -255,8 +248,8 @@ def _uses(uses: Sequence[Mapping[str, Any]]) -> Table:
 
 def _parts(parts: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
-        columns=columns_of("Marks | >Cases | >Numbers | Kinds | Hash of the truth [first digits]"),
-        rows=(
+        "Marks | >Cases | >Numbers | Kinds | Hash of the truth [first digits]",
+        (
             (
                 part["file"],
                 str(part["cases"]),

@@ -138,11 +138,9 @@ def by_form_table(cells: Sequence[Mapping[str, Any]]) -> Table:
         window, form = f"{short(low)}–{short(high)}", spanned(cell["form"] or MISSING)
         rows.append((cell["reality"], form, window, str(cell["right"]["n"]), *told))
     return Table(
-        columns=columns_of(
-            "Reality | >Cosine [of the catalogue's best member] | >d′ | >Cases | >Class right | "
-            ">Exact | >Called unknown"
-        ),
-        rows=rows,
+        "Reality | >Cosine [of the catalogue's best member] | >d′ | >Cases | >Class right | "
+        ">Exact | >Called unknown",
+        rows,
         caption="Cosine of a true effect with the nearest member of the catalogue's form, beside the nominal "
         "constants and after whitening.",
     )

@@ -14,7 +14,7 @@ from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import render
 from fogml.report.style import time_unit
-from fogml.report.tables import Table, columns_of, reference_of
+from fogml.report.tables import Table, reference_of
 from fogml.report.verdict import (
     advice_words,
     floor_told,
@@ -148,7 +148,7 @@ def _sheet(judgement: Judgement) -> Sheet:
 
 def _runs(runs: Sequence[RunJudgement]) -> Table:
     """The figures after per run, narrow enough for a page."""
-    columns = columns_of(
+    columns = (
         "Run | >Rms before [deg/h] | >Rms after [deg/h] | >Bias [deg/h] | "
         ">Bias stability over temperature [deg/h] | >Range [deg/h] | >Noise floor [deg/h] | >Outside training"
     )
@@ -195,7 +195,7 @@ def _figures(run: RunJudgement) -> Table:
             ends = term.get("ci") or (None,)
             told = "" if None in ends else " to ".join(number(end) for end in ends)
             add(_TERMS[name], f"{number(term['value'])} {term['unit']}", told, "Allan deviation of the run")
-    return Table(columns_of("Figure | >Value | >90 % interval | Of"), rows)
+    return Table("Figure | >Value | >90 % interval | Of", rows)
 
 
 def _attitude(run: RunJudgement) -> str:

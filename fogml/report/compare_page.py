@@ -124,7 +124,7 @@ def _table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
         mark = "chosen" if name == CHOOSER else "baseline" if name in BASELINES else ""
         rows.append(Row(tuple(cells), mark))
     worst = worst_run(judgements[order[0]].test)
-    columns = columns_of(
+    columns = (
         "Model | >Rms [deg/h] | >Rms over floor | >Bias [deg/h] | >Bias stability [deg/h] | "
         ">Range [deg/h] | >Outside training | >Parameters | >Weights [byte]"
         + (" | Limits" if with_limits else "")

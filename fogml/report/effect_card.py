@@ -14,7 +14,7 @@ from fogml.numerals import number
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import render
-from fogml.report.tables import Table, columns_of
+from fogml.report.tables import Table
 from fogml.signals.drawn import min_max_indices
 from fogml.twin.pictures import RATE_DEGC, AllanCurve, Picture, RateCurve
 
@@ -109,7 +109,7 @@ def quantities_table(card: Mapping[str, Any]) -> Table:
         )
         for quantity in (card["amplitude"], *card["shape"])
     ]
-    return Table(columns_of("Parameter | Meaning | Unit | >Tactical | >Navigation"), rows)
+    return Table("Parameter | Meaning | Unit | >Tactical | >Navigation", rows)
 
 
 def about(card: Mapping[str, Any]) -> list[tuple[str, str]]:

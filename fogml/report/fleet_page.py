@@ -15,7 +15,7 @@ from fogml.numerals import MISSING, averages, listed, number, percent, plural
 from fogml.report import style
 from fogml.report.figures_fleet import by_unit, constants, distribution
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.tables import Row, Table, columns_of
+from fogml.report.tables import Row, Table
 
 _PAGES = {
     "train": "report.html",
@@ -133,7 +133,7 @@ def _trends(fleet: Mapping[str, Any]) -> Table:
                 "drift seen" if trend["seen"] else "none seen",
             )
         )
-    columns = columns_of(
+    columns = (
         "Constant | >Fleet mean [deg/h per unit of the term] | >Between units, 1 σ | "
         ">Per serial number | >Probability by chance | Trend"
     )
@@ -170,7 +170,7 @@ def _table(order: list[Mapping[str, Any]]) -> Table:
                 ),
             )
         )
-    columns = columns_of(
+    columns = (
         "Unit | Job | Status | >Rms before [deg/h] | >Rms after [deg/h] | >Floor [deg/h] | "
         ">Outside training | Model, verdict or reason"
     )
@@ -246,7 +246,7 @@ def line_table(line: Mapping[str, Any]) -> Table:
             cause["place"],
         )
         rows.append(cells)
-    columns = columns_of(
+    columns = (
         "Cause | Shared | Units that have it [of those that could show it] | "
         "Share of the line [90 %] | Size [90 %] | Of the line's gap [90 %] | "
         ">Gap without it [deg/h rms] | Place"

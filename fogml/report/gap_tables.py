@@ -65,12 +65,10 @@ def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     if not rows:
         return None
     return Table(
-        columns=columns_of(
-            "Effect | >Probability | >Amplitude [± standard error] | Unit | "
-            ">Size [of the usual most] | >Of the gap [share] | Look at | Shape [± standard error] | "
-            "Can't be told from | On the runs"
-        ),
-        rows=rows,
+        "Effect | >Probability | >Amplitude [± standard error] | Unit | "
+        ">Size [of the usual most] | >Of the gap [share] | Look at | Shape [± standard error] | "
+        "Can't be told from | On the runs",
+        rows,
         caption="Highlighted: named. The probability is that one of its class acts; amplitude and shape are "
         "of the effect that stands for the class. Suspected: likely, and not sure enough for a name.",
     )
@@ -108,10 +106,7 @@ def classes_table(found: Sequence[Found], names: dict[str, str]) -> Table | None
             rows.append((title_of(first, names), title_of(second, names), separates))
     if not rows:
         return None
-    return Table(
-        columns=columns_of("These | look alike here | What separates them"),
-        rows=rows,
-    )
+    return Table("These | look alike here | What separates them", rows)
 
 
 def how_far_table(found: Diagnosis) -> Table:
@@ -151,8 +146,8 @@ def segments_table(found: Diagnosis) -> Table | None:
     kept = sorted(segments[:MOST_SEGMENTS], key=lambda s: (s.run, s.from_s))
     more = len(segments) - len(kept)
     return Table(
-        columns=columns_of("Run | >From [s] | >To [s] | >Lasts | >Excess rms [deg/h]"),
-        rows=(
+        "Run | >From [s] | >To [s] | >Lasts | >Excess rms [deg/h]",
+        (
             (
                 s.run,
                 f"{max(s.from_s, 0.0):.0f}",
@@ -182,17 +177,14 @@ def regimes_table(found: Diagnosis) -> Table:
                 part,
             )
         )
-    return Table(
-        columns=columns_of("Regime | >Excess rms [deg/h] | >90 % interval [deg/h] | >Share | >90 % interval"),
-        rows=rows,
-    )
+    return Table("Regime | >Excess rms [deg/h] | >90 % interval [deg/h] | >Share | >90 % interval", rows)
 
 
 def alternatives_table(alternatives: Sequence[Mapping[str, Any]]) -> Table:
     """Other programmes that were weighed as the next run."""
     return Table(
-        columns=columns_of("Programme | >Lasts | >Expected distance"),
-        rows=(
+        "Programme | >Lasts | >Expected distance",
+        (
             (
                 str(other.get("summary") or other.get("programme") or MISSING),
                 duration(3600.0 * other["hours"]) if "hours" in other else MISSING,
@@ -216,8 +208,8 @@ def constants_table(found: Diagnosis) -> Table:
         for c in found.constants
     ]
     return Table(
-        columns=columns_of("Constant | >Prior [± sd] | >Fitted [± se] | Unit | >Learnt"),
-        rows=rows,
+        "Constant | >Prior [± sd] | >Fitted [± se] | Unit | >Learnt",
+        rows,
         caption="Learnt: by how much the runs narrowed the prior.",
     )
 
@@ -229,19 +221,14 @@ def noise_table(found: Diagnosis) -> Table:
         words, unit = _NOISE.get(name, (name, ""))
         spread = found.noise.relative_se.get(name)
         rows.append((f"{name}, {words}", number(value), MISSING if spread is None else percent(spread), unit))
-    return Table(
-        columns=columns_of("Coefficient | >Value | >Standard error | Unit"),
-        rows=rows,
-    )
+    return Table("Coefficient | >Value | >Standard error | Unit", rows)
 
 
 def evidence_table(found: Diagnosis) -> Table:
     """Every candidate, the largest gain first."""
     return Table(
-        columns=columns_of(
-            "Candidate | Stage | >Gain alone [nats] | >Probability | >Length at usual size | Outcome"
-        ),
-        rows=(
+        "Candidate | Stage | >Gain alone [nats] | >Probability | >Length at usual size | Outcome",
+        (
             Row(
                 (
                     f"{e.title} ({e.effect})",

@@ -24,8 +24,8 @@ def nearest_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
         (title_of(n.effect, names), percent(n.share), probability_words(n.probability)) for n in found.nearest
     ]
     return Table(
-        columns=columns_of("Known cause | >Of the fit runs' gap | >Probability"),
-        rows=rows,
+        "Known cause | >Of the fit runs' gap | >Probability",
+        rows,
         caption=(
             "What each holds alone, in whatever form its family has: it is no name. Probability: as the fits "
             "weigh it; a name's is lower, as no form is quite known."
@@ -68,11 +68,9 @@ def what_if_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     ranked = sorted(found.what_if, key=lambda w: (len(w.beside), -w.share))
     rows = [_what_if(w, names) for w in ranked[:MOST_ROWS]]
     return Table(
-        columns=columns_of(
-            "Candidate | Beside | >Of the fit runs' gap | Run [held out] | >After [deg/h] | "
-            ">Closed | 90 % interval"
-        ),
-        rows=rows,
+        "Candidate | Beside | >Of the fit runs' gap | Run [held out] | >After [deg/h] | "
+        ">Closed | 90 % interval",
+        rows,
         caption="Each candidate in whatever form its family has, fitted alone or beside what is named. Those "
         f"that hold most of the gap, at most {MOST_ROWS}; gap.json has all.",
     )
@@ -95,10 +93,8 @@ def rehearsal_table(rehearsal: Sequence[Rehearsed], names: dict[str, str]) -> Ta
     if not rehearsal:
         return None
     return Table(
-        columns=columns_of(
-            "If this acted | Shape | Size | >Shows [noise lengths] | It would be | >Probability"
-        ),
-        rows=(_rehearsed(r, names) for r in _worst_first(rehearsal)),
+        "If this acted | Shape | Size | >Shows [noise lengths] | It would be | >Probability",
+        (_rehearsed(r, names) for r in _worst_first(rehearsal)),
         caption="Each candidate is put into replays of these runs, without noise, and judged by the "
         "evidence of one cause. Under a length of 3 nothing can be told.",
     )
@@ -129,13 +125,9 @@ def compensation_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
         return None
     causes = " and ".join(title_of(c.effect, names) for c in told.counted) or "no cause"
     return Table(
-        columns=columns_of(
-            "Run | >Before [deg/h] | >The twin's constants [deg/h] | >With the causes [deg/h] | "
-            ">Noise floor [deg/h]"
-        ),
-        rows=(
-            (b.run, *(number(v) for v in (b.before, b.constants, b.after, b.floor))) for b in told.held_out
-        ),
+        "Run | >Before [deg/h] | >The twin's constants [deg/h] | >With the causes [deg/h] | "
+        ">Noise floor [deg/h]",
+        ((b.run, *(number(v) for v in (b.before, b.constants, b.after, b.floor))) for b in told.held_out),
         caption=f"Rms of {averages(told.held_out[0].averaging_s)}, compensated by what the unit itself knows "
         f"in service; causes: {causes}.",
     )

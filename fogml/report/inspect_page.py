@@ -14,7 +14,7 @@ from fogml.numerals import MISSING, duration, listed, number, percent, plural, s
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import Segment, in_order, regime_word, rounded_up, shade, time_unit
-from fogml.report.tables import Noticed, Table, columns_of, noticed
+from fogml.report.tables import Noticed, Table, noticed
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals import large
@@ -142,10 +142,7 @@ def _columns(told: Mapping[str, Any]) -> Table:
         )
         for column in told["columns"]
     ]
-    return Table(
-        columns_of("Column | Unit | >Least | >Greatest | >Mean | >Standard deviation | What it is"),
-        rows,
-    )
+    return Table("Column | Unit | >Least | >Greatest | >Mean | >Standard deviation | What it is", rows)
 
 
 def _regimes(segments: Sequence[Mapping[str, Any]]) -> Table | None:
@@ -164,17 +161,14 @@ def _regimes(segments: Sequence[Mapping[str, Any]]) -> Table | None:
         if with_temperature:
             cells += [number(segment[f"temperature_{end}"], 4) for end in ("from", "to", "mean")]
         rows.append(tuple(cells))
-    return Table(columns_of(f"Regime | >From [s] | >To [s] | >Lasts{temperatures}"), rows)
+    return Table(f"Regime | >From [s] | >To [s] | >Lasts{temperatures}", rows)
 
 
 def _gaps(gaps: Sequence[Mapping[str, Any]]) -> Table | None:
     if not gaps:
         return None
     rows = [(str(gap["row"]), stated(round(gap["after_s"], 3)), duration(gap["length_s"])) for gap in gaps]
-    return Table(
-        columns_of(">First row after the gap | >Begins after [s] | >Lasts"),
-        rows,
-    )
+    return Table(">First row after the gap | >Begins after [s] | >Lasts", rows)
 
 
 def _about(told: Mapping[str, Any]) -> list[tuple[str, str]]:

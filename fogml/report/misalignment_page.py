@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from fogml.numerals import MISSING, listed, number, percent, plural, stated
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.tables import Row, Table, columns_of
+from fogml.report.tables import Row, Table
 
 
 def misalignment_page(values: Mapping[str, Any]) -> str:
@@ -86,10 +86,8 @@ def _result(values: Mapping[str, Any]) -> Table:
     for axis, value, error in zip("xy", values["fixture_error_deg"], errors):
         rows.append((f"Zero error of the fixture, {axis}", number(value, 5), number(error), MISSING, "deg"))
     return Table(
-        columns=columns_of(
-            f"Quantity | >Value | >Standard error | >{percent(values['level'], 0)} interval | Unit"
-        ),
-        rows=rows,
+        f"Quantity | >Value | >Standard error | >{percent(values['level'], 0)} interval | Unit",
+        rows,
         caption="The interval of the whole angle is what the joint region of both components spans.",
     )
 
@@ -110,10 +108,7 @@ def _methods(values: Mapping[str, Any]) -> Table:
         for method in values["methods"]
     ]
     return Table(
-        columns=columns_of(
-            f"Method | >K [{values['unit']}] | >less four states [ppm] | >x [deg] | >y [deg] | How"
-        ),
-        rows=rows,
+        f"Method | >K [{values['unit']}] | >less four states [ppm] | >x [deg] | >y [deg] | How", rows
     )
 
 

@@ -21,7 +21,7 @@ from fogml.report.monitor_words import (
     unit_label,
 )
 from fogml.report.page import Tile, render
-from fogml.report.tables import Table, columns_of
+from fogml.report.tables import Table
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
 
@@ -125,7 +125,7 @@ def _table(unit: Mapping[str, Any]) -> Table:
         )
         for run in unit["runs"]
     ]
-    columns = columns_of(
+    columns = (
         "Run | Began | >Bias [deg/h] | >Slope, temperature [deg/h/°C] | "
         ">Slope, rate [deg/h/(°C/min)] | >Scatter [deg/h] | >Scale factor error [ppm] | "
         ">Outside training"

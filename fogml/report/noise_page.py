@@ -8,7 +8,7 @@ from typing import Any
 from fogml.numerals import MISSING, duration, lowest_from, number, unit_words
 from fogml.report.figures_noise import TERM_WORDS, allan_plot
 from fogml.report.page import Tile, render
-from fogml.report.tables import Table, columns_of, noticed
+from fogml.report.tables import Table, noticed
 
 
 def noise_page(noise: Mapping[str, Any]) -> str:
@@ -97,17 +97,14 @@ def _terms(noise: Mapping[str, Any]) -> Table:
             told = "seen" if interval[0] else "not told from zero"
         rows.append((f"{key}, {words}", number(value), _interval(term), _unit(term), told))
     level = 100 * float(noise.get("level", 0.9))
-    return Table(
-        columns=columns_of(f"Term | >Value | >{level:.0f} % interval | Unit | In the data"),
-        rows=rows,
-    )
+    return Table(f"Term | >Value | >{level:.0f} % interval | Unit | In the data", rows)
 
 
 def _deviations(noise: Mapping[str, Any]) -> Table:
     intervals = noise.get("ci") or [[None, None]] * len(noise["taus_s"])
     return Table(
-        columns=columns_of(">τ [s] | >Allan deviation [deg/h] | >Interval [deg/h]"),
-        rows=(
+        ">τ [s] | >Allan deviation [deg/h] | >Interval [deg/h]",
+        (
             (number(tau, 4), number(value), f"{number(low)} … {number(high)}")
             for tau, value, (low, high) in zip(noise["taus_s"], noise["adev"], intervals, strict=True)
         ),
@@ -153,8 +150,8 @@ def _replicates(noise: Mapping[str, Any]) -> Table | None:
         return None
     terms = [(str(one["run"]), one["terms"]["N"]) for one in runs]
     return Table(
-        columns=columns_of(f"Run | >N alone [{_unit(terms[0][1])}] | >Interval"),
-        rows=((name, number(term["value"]), _interval(term)) for name, term in terms),
+        f"Run | >N alone [{_unit(terms[0][1])}] | >Interval",
+        ((name, number(term["value"]), _interval(term)) for name, term in terms),
     )
 
 

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from fogml.numerals import MISSING, duration, listed, number, stated, to_error
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.tables import Row, Table, columns_of, noticed
+from fogml.report.tables import Row, Table, noticed
 
 
 def north_page(values: Mapping[str, Any]) -> str:
@@ -108,11 +108,9 @@ def _ways(values: Mapping[str, Any]) -> Table:
         for name, told in values["ways"].items()
     ]
     return Table(
-        columns=columns_of(
-            "Way | >Stays | >Dwell [s] | >Error here [deg] | >Greatest error [deg] | "
-            ">Rms over the circle [deg] | >Standard error of noise, rms [deg]"
-        ),
-        rows=rows,
+        "Way | >Stays | >Dwell [s] | >Error here [deg] | >Greatest error [deg] | "
+        ">Rms over the circle [deg] | >Standard error of noise, rms [deg]",
+        rows,
         caption=f"Every way takes {duration(values['duration_s'])} with transfers. Dwell: of the fine one.",
     )
 
@@ -131,10 +129,7 @@ def _quiet(values: Mapping[str, Any]) -> Table:
         for told in values["quiet_by_set_up"]
     ]
     return Table(
-        columns=columns_of(
-            "Positions taken | Order [deg] | >Quiet for a linear drift [deg] | >Quiet for this drift [deg]"
-        ),
-        rows=rows,
+        "Positions taken | Order [deg] | >Quiet for a linear drift [deg] | >Quiet for this drift [deg]", rows
     )
 
 
@@ -143,10 +138,7 @@ def _stays(values: Mapping[str, Any]) -> Table:
         (str(stay["position"]), number(stay["time_s"], 5), number(stay["mean_deg_h"], 6))
         for stay in values["stays"]
     ]
-    return Table(
-        columns=columns_of("Position | >Middle [s] | >Mean [deg/h]"),
-        rows=rows,
-    )
+    return Table("Position | >Middle [s] | >Mean [deg/h]", rows)
 
 
 def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -247,10 +247,8 @@ def _wanted(values: Mapping[str, Any]) -> Table | None:
         for e in values["wanted"]
     ]
     return Table(
-        columns=columns_of(
-            "Wanted | Unit | >Taken as | >Standard error before | >Expected standard error | Shown"
-        ),
-        rows=rows,
+        "Wanted | Unit | >Taken as | >Standard error before | >Expected standard error | Shown",
+        rows,
         caption="Fitted with the nominal constants under their priors. Shown: a tenth better than before; "
         "of an amplitude, that its usual size is three standard errors.",
     )
@@ -278,8 +276,8 @@ def _separations(values: Mapping[str, Any]) -> Table | None:
     if not rows:
         return None
     return Table(
-        columns=columns_of("If it is | and is taken for | >Distance | >Length beside the constants"),
-        rows=rows,
+        "If it is | and is taken for | >Distance | >Length beside the constants",
+        rows,
         caption=(
             "In standard deviations of the noise: what the best fit of the other leaves, amplitude and shape "
             "free, and what the constants leave."

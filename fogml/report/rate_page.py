@@ -13,7 +13,7 @@ from fogml.numerals import number, stated, unit_words
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import Tile, render
-from fogml.report.tables import Table, columns_of
+from fogml.report.tables import Table
 
 
 def rate_page(values: Mapping[str, Any]) -> str:
@@ -63,10 +63,7 @@ def _bracket_tile(name: str, found: Mapping[str, float | None]) -> Tile:
 
 def _result(values: Mapping[str, Any]) -> Table:
     rows = tuple(tuple(row) for row in result_rows(values, number))
-    return Table(
-        columns_of("Quantity | >Value | >Standard error | Unit | Remark"),
-        rows,
-    )
+    return Table("Quantity | >Value | >Standard error | Unit | Remark", rows)
 
 
 def _ladder(values: Mapping[str, Any]) -> tuple[str, Markup, str] | None:
@@ -186,5 +183,5 @@ def _unit(facts: Mapping[str, Any] | None) -> Table | None:
         f"{stated(facts['wavelength_nm'])} nm, {facts['winding']} winding of {facts['layers']} layers, "
         f"leads of {' and '.join(stated(length) for length in facts['leads_m'])} m."
     )
-    columns = columns_of("Quantity | >Value | Unit")
+    columns = "Quantity | >Value | Unit"
     return Table(columns, rows, caption)

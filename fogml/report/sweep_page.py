@@ -13,7 +13,7 @@ from fogml.numerals import MISSING, averages, number, percent, plural
 from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import log_axis
-from fogml.report.tables import Row, Table, columns_of, metrics_table
+from fogml.report.tables import Row, Table, metrics_table
 from fogml.report.verdict import worst_run
 from fogml.tuning.winner import DEFAULT
 from fogml.validation.results import Judgement
@@ -308,7 +308,7 @@ def _pareto_table(study: Mapping[str, Any]) -> Table:
             str(trial["operations"]),
         )
         rows.append(Row(cells, "chosen" if trial["number"] == study["winner"]["number"] else ""))
-    columns = columns_of(
+    columns = (
         "Model | >Held-out rms [deg/h] | >About each run's mean [deg/h] | >Weights [byte] | "
         ">Operations [per sample]"
     )

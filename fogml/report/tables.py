@@ -45,7 +45,7 @@ class Table:
     Attributes
     ----------
     columns
-        Every one has a heading.
+        Every one has a heading. May be given as the text that `columns_of` reads.
     rows
         What is given as cells alone is a row as well.
     caption
@@ -61,12 +61,13 @@ class Table:
 
     def __init__(
         self,
-        columns: Iterable[Column],
+        columns: str | Iterable[Column],
         rows: Iterable[Row | tuple[str, ...]],
         caption: str = "",
         sortable: bool = False,
     ) -> None:
-        self.columns, self.caption, self.sortable = tuple(columns), caption, sortable
+        self.columns = columns_of(columns) if isinstance(columns, str) else tuple(columns)
+        self.caption, self.sortable = caption, sortable
         self.rows = tuple(row if isinstance(row, Row) else Row(row) for row in rows)
         for place, (heading, _, _) in enumerate(self.columns, 1):
             if not heading.strip():
@@ -113,12 +114,10 @@ def metrics_table(judged: RunJudgement) -> Table:
         cells = (label(field.name), number(before), number(after), floor, unit_of(field.name))
         rows.append(cells)
     return Table(
-        columns=columns_of("Figure | >Before | >After | >Floor | Unit"),
-        rows=rows,
-        caption=(
-            f"{averages(judged.averaging_s)} where not said otherwise; "
-            f"bias relative to {reference_of(judged)}."
-        ),
+        "Figure | >Before | >After | >Floor | Unit",
+        rows,
+        caption=f"{averages(judged.averaging_s)} where not said otherwise; "
+        f"bias relative to {reference_of(judged)}.",
     )
 
 
@@ -141,11 +140,9 @@ def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
         for run in runs
     ]
     return Table(
-        columns=columns_of(
-            "Run | >Bias [deg/h] | >Bias stability [deg/h] | >Range [deg/h] | >Rms [deg/h] | "
-            ">Noise floor [deg/h] | >Outside training | >Samples used"
-        ),
-        rows=rows,
+        "Run | >Bias [deg/h] | >Bias stability [deg/h] | >Range [deg/h] | >Rms [deg/h] | "
+        ">Noise floor [deg/h] | >Outside training | >Samples used",
+        rows,
         caption=f"{averages(runs[0].averaging_s).capitalize()}, before → after{caption}.",
     )
 
@@ -178,8 +175,8 @@ def repeatability_table(found: Repeatability | None) -> Table | None:
     told = {"bias_repeatability": found.bias, "scale_factor_repeatability": found.scale_factor}
     cycles = "power cycles" if found.power_cycles else "runs, each taken as one power cycle"
     return Table(
-        columns=columns_of("Figure | >Before | >After | Unit | After, 90 %"),
-        rows=(
+        "Figure | >Before | >After | Unit | After, 90 %",
+        (
             (
                 label(name),
                 number(figure.before),
@@ -217,8 +214,8 @@ def coefficients_table(model: Mapping[str, Any]) -> Table | None:
     if not told:
         return None
     return Table(
-        columns=columns_of("Term | >Coefficient [deg/h per unit of the term] | >Standard error"),
-        rows=((name, number(value, 5), number(error, 2)) for name, value, error in told),
+        "Term | >Coefficient [deg/h per unit of the term] | >Standard error",
+        ((name, number(value, 5), number(error, 2)) for name, value, error in told),
         caption=_OF_THE_OUTPUT if any(name == "D" for name, *_ in told) else "",
     )
 
@@ -229,8 +226,8 @@ def candidates_table(model: Mapping[str, Any]) -> Table | None:
     if not candidates:
         return None
     return Table(
-        columns=columns_of("Candidate | >Parameters | >Rms held out [deg/h]"),
-        rows=(
+        "Candidate | >Parameters | >Rms held out [deg/h]",
+        (
             (str(told["name"]), str(told["parameters"]), number(float(told["held_out_rms"])))
             for told in candidates
         ),
