@@ -164,8 +164,7 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> None:
         (staging / "score.html").write_text(benchmark_page(values), encoding="utf-8")
         settings.write_into(staging, "benchmark score")
     for table in (drift_table(values), diagnosis_table(values)):
-        if table is not None:
-            terminal.table(table.caption, [c[0] for c in table.columns], [r.cells for r in table.rows])
+        terminal.show(table)
     terminal.result(values)
     terminal.say(f"Written to {out}: open {out / 'score.html'}")
 

@@ -238,11 +238,7 @@ def _print(values: dict[str, Any], method: str, terminal: Terminal) -> None:
     from fogml.report.blind_tables import by_reality_table, figure_text, wanted_text
 
     wanted = by_reality_table(values["methods"][method]["by_reality"])
-    terminal.table(
-        f"{method}: what is wanted, by reality",
-        [c[0] for c in wanted.columns],
-        [r.cells for r in wanted.rows],
-    )
+    terminal.show(wanted, f"{method}: what is wanted, by reality")
     rows = [
         [row["words"], figure_text(row), wanted_text(row), str(row["n"])]
         for row in values["methods"][method]["rows"]

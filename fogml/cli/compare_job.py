@@ -7,8 +7,8 @@ from pathlib import Path
 
 from fogml.cli.model_commands import CompareSettings
 from fogml.cli.runs import open_runs
-from fogml.cli.terminal import Terminal, number
-from fogml.cli.train_job import check_settings, floor_words, noise_run
+from fogml.cli.terminal import Terminal
+from fogml.cli.train_job import check_settings, noise_run
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
@@ -96,23 +96,12 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
 
 
 def _print(comparison: Comparison, terminal: Terminal) -> None:
-    from fogml.report.compare_page import ranked
+    from fogml.report.compare_page import models_table, ranked
     from fogml.report.verdict import own_noise_by, worst_run
 
-    several = len(next(iter(comparison.judgements.values())).test) > 1
-    rows = []
-    for name, judgement in comparison.judgements.items():
-        for run in judgement.test:
-            label = f"{name} on {run.run}" if several else name
-            figures = (run.after.rms, run.after.bias, run.after.bias_stability, run.after.range)
-            rows.append([label, str(judgement.model["parameters"]), *(number(value) for value in figures)])
-    run = next(iter(comparison.judgements.values())).test[0]
-    terminal.table(
-        f"After compensation, {run.averaging_s:g} s averages, deg/h; noise floor {floor_words(run)}",
-        ["model", "parameters", "rms", "bias", "bias stability", "range"],
-        rows,
-    )
-    best = ranked(comparison.judgements)[0]
+    order = ranked(comparison.judgements)
+    best = order[0]
+    terminal.show(models_table(comparison.judgements, order))
     terminal.say(f"{best} leaves least. {own_noise_by(worst_run(comparison.judgements[best].test))}")
     for name, reason in comparison.failed.items():
         terminal.say(f"{name}: not fitted: {reason}")

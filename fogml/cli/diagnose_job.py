@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from fogml.cli.from_diagnosis import not_compensated, with_brought
 from fogml.cli.runs import open_run, open_runs
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal
 from fogml.cli.twin_commands import DiagnoseSettings
 from fogml.errors import InputError
 from fogml.fleet.manifest import folder_names
@@ -186,20 +184,11 @@ def write_gap(folder: Path, found: Diagnosis) -> None:
         (folder / NEXT_RUN).write_text(found.separating_run.programme, encoding="utf-8")
 
 
-def rehearsal_rows(rehearsal: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
-    """Head and rows of a table of what runs would name."""
-    head = ["if this acted", "shape", "size", "whitened length", "it would be"]
-    return head, [[r["effect"], r["form"], r["size"], number(r["length"]), _outcome(r)] for r in rehearsal]
-
-
-def _outcome(rehearsed: Mapping[str, Any]) -> str:
-    """``named``, or what with, where more than the effect itself would be named."""
-    names = list(rehearsed["named_as"])
-    others = "" if names in ([], [rehearsed["effect"]]) else f" as {', '.join(names)}"
-    return rehearsed["outcome"] + others
-
-
 def _print(found: Diagnosis, terminal: Terminal) -> None:
+    from fogml.report.gap_tables import how_far_table
+    from fogml.report.gap_tables_ahead import compensation_table, rehearsal_table
+    from fogml.report.gap_words import titles
+
     terminal.say(f"Verdict: {found.verdict.replace('_', ' ')}")
     if found.found:
         rows = [
@@ -218,48 +207,24 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
         )
     if found.unknown.probability >= 0.05:
         terminal.say(f"Unknown: probability {found.unknown.probability:.2f}; {found.unknown.looks_like}")
-    rows = [
-        [
-            item.run,
-            *(number(value) for value in (item.before, item.recalibrated, item.after, item.floor)),
-            "–" if item.closed is None else f"{item.closed:.2f}",
-        ]
-        for item in found.how_far
-    ]
-    if rows:
-        title = f"Rms of {found.how_far[0].averaging_s:g} s averages, held out [deg/h]"
-        terminal.table(title, ["run", "before", "recalibrated", "after", "floor", "closed"], rows)
-    _print_brought(found, terminal)
+    if found.how_far:
+        terminal.show(how_far_table(found))
+    names = titles(found)
+    if (brought := found.compensation) is not None:
+        if brought.note:
+            terminal.say(f"What compensation would bring is not known: {brought.note}")
+        terminal.show(compensation_table(found, names))
+        for said in not_compensated(brought) if brought.held_out else ():
+            terminal.say(f"{said[0].upper()}{said[1:]}.")
+        if brought.held_out and brought.counted:
+            terminal.say("Such a model: fogml train RUN... --test RUN --from-diagnosis DIR")
     if (run := found.separating_run) is not None:
         verb = "would show" if run.aim == "show" else "would tell apart"
         terminal.say(f"Next: a programme of {run.hours:.1f} h {verb} {', '.join(run.separates)}: {NEXT_RUN}")
     for said in found.headline:
         terminal.say(said)
-    if found.rehearsal:
-        table = rehearsal_rows([asdict(r) for r in found.rehearsal])
-        terminal.table("What these runs would name", *table)
+    terminal.show(rehearsal_table(found.rehearsal, names), "What these runs would name")
     if found.held_out_is_part:
         terminal.say("No run was held out: the last stretch of the last run was kept back for the figures.")
     for name, reason in found.unusable:
         terminal.note(f"{name} not used: {reason}")
-
-
-def _print_brought(found: Diagnosis, terminal: Terminal) -> None:
-    """What a drift model made of the diagnosis brings on the held-out runs."""
-    told = found.compensation
-    if told is None:
-        return
-    if told.note:
-        terminal.say(f"What compensation would bring is not known: {told.note}")
-    if not told.held_out:
-        return
-    rows = [
-        [b.run, *(number(value) for value in (b.before, b.constants, b.after, b.floor))]
-        for b in told.held_out
-    ]
-    heads = ["run", "before", "twin's constants", "with the causes", "noise floor"]
-    terminal.table("Compensated by what a gyro knows itself, rms on held-out runs [deg/h]", heads, rows)
-    for said in not_compensated(told):
-        terminal.say(f"{said[0].upper()}{said[1:]}.")
-    if told.counted:
-        terminal.say("Such a model: fogml train RUN... --test RUN --from-diagnosis DIR")

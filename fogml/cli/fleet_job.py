@@ -8,7 +8,7 @@ from typing import Any
 
 from fogml.cli.fleet_unit import UnitWork
 from fogml.cli.run_commands import FleetSettings
-from fogml.cli.terminal import UNITS_SHOWN, Terminal, Work, number
+from fogml.cli.terminal import UNITS_SHOWN, Terminal, Work
 from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
@@ -168,18 +168,11 @@ def _track(tracker: Tracker, outcome: dict[str, Any]) -> None:
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.fleet.summary import told_of
+    from fogml.report.fleet_page import units_table
 
-    rows = []
-    for unit in values["units"][:UNITS_SHOWN]:
-        label = f"{unit['unit']} {unit['axis']}".strip()
-        told = told_of(unit) or unit["reason"]
-        figures = [number(unit[key]) for key in ("before", "after", "floor")]
-        rows.append([label, unit["job"], unit["status"], *figures, told])
-    heads = ["unit", "job", "status", "rms before", "rms after", "floor", "model or reason"]
     times = {unit["averaging_s"] for unit in values["units"] if unit["averaging_s"]}
     over = f", {times.pop():g} s averages" if len(times) == 1 else ""
-    terminal.table(f"Worst test run of each unit [deg/h]{over}", heads, rows)
+    terminal.show(units_table(values["units"]), f"Worst test run of each unit{over}", UNITS_SHOWN)
     for key, what in (("outliers", "Unlike the others"), ("again", "Needs another run")):
         for item in values[key][:UNITS_SHOWN]:
             terminal.say(f"{what}: {item['unit']}: {item['why']}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fogml.cli.lab import AcceptanceSettings, BatchSettings
 from fogml.cli.runs import open_runs, tell
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 
 if TYPE_CHECKING:
@@ -122,20 +122,8 @@ def batch_and_write(settings: BatchSettings, terminal: Terminal) -> bool:
 
 
 def _print_batch(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.acceptance_page import limit_words, verdict_sentences
+    from fogml.report.acceptance_page import distribution_table, verdict_sentences
 
-    rows = [
-        [
-            one["name"],
-            str(one["tested"]),
-            *(number(one["distribution"][part]) for part in ("median", "largest")),
-            one["unit"],
-            limit_words(one["limit"]),
-            str(one["over"]),
-        ]
-        for one in values["quantities"]
-    ]
-    heads = ["quantity", "units", "median", "largest", "unit", "limit", "over"]
-    terminal.table("Acceptance of a batch", heads, rows)
+    terminal.show(distribution_table(values))
     for sentence in verdict_sentences(values):
         terminal.say(sentence)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from fogml.cli.lab import WAYS, MisalignmentSettings, NorthSettings, RateSettings
@@ -16,7 +15,7 @@ from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows, verdict_sentences
-from fogml.numerals import duration, percent, short, to_error, with_error
+from fogml.numerals import to_error, with_error
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
@@ -34,50 +33,14 @@ def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -
 
 
 def _print_misalignment(values: dict[str, Any], terminal: Terminal) -> None:
-    se, intervals = values["se"], values["intervals"]
-    rows = [
-        [label, *_figures(values[key], se.get(key), intervals.get(key)), unit]
-        for label, key, unit in (
-            ("scale factor K", "K", values["unit"]),
-            ("delta x", "delta_x_deg", "deg"),
-            ("delta y", "delta_y_deg", "deg"),
-            ("delta", "delta_deg", "deg"),
-        )
-    ]
-    fixture_se = se.get("fixture_error_deg", [None, None])
-    for axis, value, error in zip("xy", values["fixture_error_deg"], fixture_se, strict=True):
-        rows.append([f"fixture error {axis}", *_figures(value, error, None), "deg"])
-    level = percent(values["level"], 0)
-    terminal.table(
-        f"{values['source']}: scale factor and misalignment, four states"
-        + (" (synthetic data)" if values["synthetic"] else ""),
-        ["quantity", "value", "standard error", f"{level} from", "to", "unit"],
-        rows,
-    )
-    rows = [
-        [
-            m["name"],
-            "–" if m["K"] is None else f"{m['K']:.9g}",
-            *(number(m[key]) for key in ("K_difference_ppm", "delta_x_deg", "delta_y_deg")),
-        ]
-        for m in values["methods"]
-    ]
-    header = ["method", f"K [{values['unit']}]", "K less four states [ppm]", "delta x [deg]", "delta y [deg]"]
-    terminal.table("Methods on the same turns", header, rows)
+    from fogml.report.misalignment_page import methods_table, result_table
+
+    synthetic = " (synthetic data)" if values["synthetic"] else ""
+    title = f"{values['source']}: scale factor and misalignment, four states{synthetic}"
+    terminal.show(result_table(values), title)
+    terminal.show(methods_table(values), "Methods on the same turns")
     for note in values["notes"]:
         terminal.say(note)
-
-
-def _figures(value: float, error: float | None, ends: list[float] | None) -> list[str]:
-    """Value, standard error and interval, to the first digit of the standard error."""
-
-    def told(figure: float) -> str:
-        # 0.0 is added as a zero has no sign.
-        return f"{round(figure, places) + 0.0:.{places}f}" if error else f"{figure:.7g}"
-
-    places = max(-math.floor(math.log10(error)), 0) if error else 0
-    shown = [told(end) for end in ends] if ends else ["–", "–"]
-    return [told(value), "–" if error is None else short(error, 2), *shown]
 
 
 def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:
@@ -194,25 +157,9 @@ def _print_north(values: dict[str, Any], terminal: Terminal) -> None:
             f"simulated at {values['true_azimuth_deg']:g} deg: found {values['azimuth_deg']:.5f}{se} deg "
             f"({values['way']}), error {number(values['error_deg'])} deg"
         )
-        rows = [
-            [
-                name,
-                *(
-                    number(told[key])
-                    for key in ("dwell_s", "error_deg", "greatest_error_deg", "rms_error_deg", "rms_se")
-                ),
-            ]
-            for name, told in values["ways"].items()
-        ]
-        header = [
-            "way",
-            "dwell [s]",
-            "error here [deg]",
-            "greatest [deg]",
-            "rms [deg]",
-            "se of noise, rms [deg]",
-        ]
-        terminal.table(f"Ways to spend {duration(values['duration_s'])}", header, rows)
+        from fogml.report.north_page import ways_table
+
+        terminal.show(ways_table(values))
     azimuths = [", ".join(f"{a:.2f}" for a in values[f"{k}_azimuth_deg"]) for k in ("quiet", "worst")]
     quiet, worst = (f"{told} deg" if told else "none" for told in azimuths)
     terminal.say(f"quiet azimuths {quiet}; worst {worst}")

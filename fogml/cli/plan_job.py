@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fogml.cli.diagnose_job import rehearsal_rows
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal
 from fogml.cli.twin_commands import PlanSettings
 from fogml.gap.planning.plan import plan_runs
 from fogml.gap.planning.plan_result import Plan, plan_values, programme_file, simulation_file
@@ -75,23 +74,18 @@ def _simulation(place: int, twin: str, facts: Facts) -> str:
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    from fogml.report.plan_page import planned_rehearsal, wanted_table
+
     for run in values["runs"]:
         terminal.say(f"{run['programme']}: {short(run['hours'])} h, {run['summary']}")
-    if values["wanted"]:
-        rows = [
-            [e["name"], e["unit"], number(e["usual"]), number(e["prior_se"]), number(e["se"])]
-            for e in values["wanted"]
-        ]
-        header = ["wanted", "unit", "taken as", "before", "expected se"]
-        terminal.table("Expected standard errors", header, rows)
+    terminal.show(wanted_table(values), "Expected standard errors")
     for item in values["separations"]:
         told = "enough to tell" if item["enough"] else "not enough to tell"
         what = " and ".join(item["separates"])
         terminal.say(
             f"{what}: distance {short(item['distance'])}, {told} (from {values['least_distance']:g} on)"
         )
-    if values["rehearsal"]:
-        terminal.table("What a diagnosis of these runs would name", *rehearsal_rows(values["rehearsal"]))
+    terminal.show(planned_rehearsal(values), "What a diagnosis of these runs would name")
     hidden = [e["name"] for e in values["wanted"] if not e["shown"]]
     if hidden:
         terminal.note(f"{', '.join(hidden)}: does not show at its usual size, or no better than beforehand")

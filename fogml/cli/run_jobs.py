@@ -251,32 +251,13 @@ def _floor(run: Run, taus_s: Sequence[float]) -> dict[str, Any] | None:
 
 
 def _print_noise(values: dict[str, Any], terminal: Terminal) -> None:
+    from fogml.report.noise_page import deviations_table, replicates_table, terms_table
+
     kind = "overlapping" if values["overlapping"] else "not overlapping"
-    rows = [
-        [f"{tau:.6g}", number(adev), number(low), number(high)]
-        for tau, adev, (low, high) in zip(values["taus_s"], values["adev"], values["ci"], strict=True)
-    ]
     level = percent(values["level"], 0)
-    terminal.table(
-        f"{values['run']}: Allan deviation, {kind}",
-        ["tau [s]", "deviation [deg/h]", f"{level} from", "to"],
-        rows,
-    )
-    rows = [
-        [name, number(term["value"]), number(term["ci"][0]), number(term["ci"][1]), term["unit"]]
-        for name, term in values["terms"].items()
-    ]
-    terminal.table("IEEE 952 terms", ["term", "value", f"{level} from", "to", "unit"], rows)
-    if len(values["runs"]) > 1:
-        rows = [
-            [
-                one["run"],
-                *(number(one["terms"]["N"][key]) for key in ("value",)),
-                *map(number, one["terms"]["N"]["ci"]),
-            ]
-            for one in values["runs"]
-        ]
-        terminal.table("N of each run alone [deg/sqrt(h)]", ["run", "N", f"{level} from", "to"], rows)
+    terminal.show(deviations_table(values), f"{values['run']}: Allan deviation, {kind}, {level} intervals")
+    terminal.show(terms_table(values), "IEEE 952 terms")
+    terminal.show(replicates_table(values))
     floor = values.get("floor")
     if floor:
         low, high = floor["ci"][0]

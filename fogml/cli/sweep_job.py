@@ -16,7 +16,7 @@ from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.tracking import Tracker
-from fogml.tuning.plan import OBJECTIVES, Plan, run_identity
+from fogml.tuning.plan import Plan, run_identity
 from fogml.tuning.study import IDENTITY
 from fogml.yaml_text import parse_yaml
 
@@ -143,7 +143,7 @@ def _judge(
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.sweep_page import parts_held_out, standing
+    from fogml.report.sweep_page import pareto_table, parts_held_out, standing
 
     for text in standing(values["winner"]):
         terminal.say(text)
@@ -152,19 +152,7 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         f"{counts['complete'] + counts['pruned']} trials finished, {counts['pruned']} of them pruned or "
         f"refused, judged on {parts_held_out(values)}."
     )
-    rows = []
-    for place in values["pareto"][:20]:
-        trial = values["trials"][place]
-        mark = "winner" if trial["number"] == values["winner"]["number"] else ""
-        figures = [
-            number(trial["rms"]),
-            number(trial["bias_stability"]),
-            str(trial["bytes"]),
-            str(trial["operations"]),
-        ]
-        rows.append([f"{trial['model']}: {trial['features'] or 'no features'}", *figures, mark])
-    units = [f"{name} [{unit}]" for name, unit in OBJECTIVES.items()]
-    terminal.table("Trials that none beats in every objective", ["model", *units, "chosen"], rows)
+    terminal.show(pareto_table(values))
     judged = values["winner"].get("judged")
     for run in judged["test"] if judged else []:
         terminal.say(

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
-from typing import Any, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
 import click
 
@@ -19,6 +19,9 @@ from fogml.escaping import terminal_text, visible
 from fogml.json_files import json_text
 from fogml.numerals import percent, short
 from fogml.processes import heed_interrupt
+
+if TYPE_CHECKING:
+    from fogml.report.tables import Table
 
 _LINE_EVERY_S = 10.0
 """Where stderr is no terminal, a line on long work this often."""
@@ -106,6 +109,19 @@ class Terminal:
         for row in rows:
             table.add_row(*map(terminal_text, row))
         console.print(table)
+
+    def show(self, table: Table | None, title: str = "", most: int | None = None) -> None:
+        """A page's table on stdout under a title or its caption; at most so many rows, none of no table."""
+        if table is None:
+            return
+        heads = [f"{name} [{unit}]" if unit else name for name, unit, _ in table.columns]
+        # A power of ten is one word.
+        rows = [[cell.replace(" × 10", "×10") for cell in row.cells] for row in table.rows[:most]]
+        if any(row.mark == "chosen" for row in table.rows):
+            heads.append("chosen")
+            for row, cells in zip(table.rows, rows):
+                cells.append("✓" if row.mark == "chosen" else "")
+        self.table(title or table.caption, heads, rows)
 
     @contextmanager
     def work(self, what: str, total: float | None = None) -> Iterator[Work]:

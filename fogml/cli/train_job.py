@@ -14,6 +14,7 @@ from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
+from fogml.numerals import percent
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
@@ -209,52 +210,27 @@ def floor_words(run: RunJudgement) -> str:
 
 def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     """The figures of the test runs as a table, then limits and notes."""
-    from fogml.numerals import label, percent, unit_of
+    from fogml.report.tables import beside_table, metrics_table, repeatability_table
     from fogml.report.verdict import own_noise_by, unsettled, worst_run
 
-    rows = []
-    for run in judgement.test:
-        for when, figures in (("before", run.before), ("after", run.after)):
-            values = (figures.bias, figures.bias_stability, figures.range, figures.rms)
-            rows.append([f"{run.run} {when}", *(number(value) for value in values)])
-        rows.append([f"{run.run} noise floor", "–", floor_words(run), "–", "–"])
-    averaging = f"{judgement.test[0].averaging_s:g} s averages, deg/h"
     synthetic = any(run.facts.synthetic for run in (*judgement.train, *judgement.test))
-    title = f"{judgement.model['kind']} on {'runs' if len(judgement.test) > 1 else 'the run'} not trained on"
-    averaging += "; synthetic data" if synthetic else ""
-    terminal.table(f"{title} ({averaging})", ["run", "bias", "bias stability", "range", "rms"], rows)
+    for run in judgement.test:
+        told = f"{judgement.model['kind']} on {run.run}, not trained on{' (synthetic data)' * synthetic}"
+        terminal.say(f"{told}; noise floor {floor_words(run)} deg/h")
+        terminal.show(metrics_table(run))
     if judgement.beside:
-        from fogml.report.tables import beside_table
         from fogml.validation.advice import which_to_use
 
-        table = beside_table(judgement)
-        assert table is not None
-        heads = [heading.lower() for heading, _, _ in table.columns]
-        terminal.table("Beside other models, rms [deg/h]", heads, [list(row.cells) for row in table.rows])
+        terminal.show(beside_table(judgement), "Beside other models")
         terminal.say(which_to_use(judgement)[1])
     terminal.say(own_noise_by(worst_run(judgement.test)))
     for run in judgement.test:
-        for name in _TOLD_BY_SOME:
-            before, after = getattr(run.before, name), getattr(run.after, name)
-            if after is not None:
-                text = f"{number(before)} before, {number(after)} after"
-                terminal.say(f"{run.run}: {label(name)}: {text} [{unit_of(name)}]")
         _say_stability(run, terminal)
         if run.outside_training:
             terminal.say(f"{run.run}: {percent(run.outside_training)} of the samples outside training")
         if told := unsettled(run):
             terminal.say(f"{run.run}: {told}")
-    spread = judgement.repeatability
-    if spread is not None:
-        over = f"over {spread.runs} {'power cycles' if spread.power_cycles else 'runs'}"
-        for name, figure in (
-            ("bias_repeatability", spread.bias),
-            ("scale_factor_repeatability", spread.scale_factor),
-        ):
-            if figure is not None:
-                ends = " to ".join(map(number, figure.after_ci90))
-                text = f"{number(figure.before)} before, {number(figure.after)} (90 %: {ends}) after"
-                terminal.say(f"{label(name)} {over}: {text} [{unit_of(name)}]")
+    terminal.show(repeatability_table(judgement.repeatability))
     stated = [*judgement.limits]
     if judgement.design_index is not None:
         stated.insert(0, judgement.design_index)
@@ -292,15 +268,3 @@ def _say_stability(run: RunJudgement, terminal: Terminal) -> None:
             told.append(f"{number(found.value)} ({low} to {high}) {what}")
     if told:
         terminal.say(f"{run.run}: Bias stability after, over n - 1: {'; '.join(told)} [deg/h]")
-
-
-_TOLD_BY_SOME = (
-    "scale_factor_error",
-    "scale_factor_error_largest",
-    "scale_factor_nonlinearity",
-    "scale_factor_asymmetry",
-    "temperature_sensitivity",
-    "hysteresis",
-    "turn_on_time",
-)
-"""Figures that only runs with turns, soaks or a stated power-on tell."""

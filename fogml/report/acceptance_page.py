@@ -196,7 +196,7 @@ def batch_page(values: Mapping[str, Any], name: str = "Batch") -> str:
         name=name,
         verdict=verdict_sentences(values),
         tiles=_tiles(values),
-        distribution=_distribution(values),
+        distribution=distribution_table(values),
         left_out=len(values["quantities"]) - len(shown),
         units=_units(values["units"], shown),
     )
@@ -238,7 +238,8 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
     ]
 
 
-def _distribution(values: Mapping[str, Any]) -> Table:
+def distribution_table(values: Mapping[str, Any]) -> Table:
+    """How the units' figures spread, quantity by quantity, against the limits."""
     parts = ("least", "q10", "median", "q90", "largest")
     columns = "Quantity | Unit | >Units tested | >Least | >10 % | >Median | >90 % | >Largest | >Limit | >Over"
     rows = [

@@ -49,7 +49,7 @@ def compare_page(judgements: Mapping[str, Judgement], failed: Mapping[str, str] 
         unseen=unseen(first),
         train_runs=[run.run for run in first.train],
         averaging_s=first.test[0].averaging_s,
-        table=_table(judgements, order),
+        table=models_table(judgements, order),
         runs_table=_runs_table(judgements, order) if len(first.test) > 1 else None,
         bars=rms_bars(judgements, order),
         residuals=residuals_in_time(judgements, shown, worst_run(first.test).run),
@@ -101,7 +101,8 @@ def _chosen(judgements: Mapping[str, Judgement]) -> str:
     )
 
 
-def _table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
+def models_table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
+    """What each model leaves on its worst test run, and what it costs."""
     with_limits = any(stated_limits(judgement) for judgement in judgements.values())
     rows = []
     for name in order:

@@ -53,7 +53,7 @@ def fleet_page(fleet: Mapping[str, Any], name: str = "fleet", batch: str | None 
         trends=_trends(fleet) if "constants" in fleet else None,
         outliers=[(item["unit"], item["why"]) for item in fleet["outliers"]],
         again=[(f"{item['unit']} ({item['job']})", item["why"]) for item in fleet["again"]],
-        table=_table(order),
+        table=units_table(order),
         batch=batch,
         line=_line(fleet),
     )
@@ -142,7 +142,8 @@ def _trends(fleet: Mapping[str, Any]) -> Table:
     )
 
 
-def _table(order: list[Mapping[str, Any]]) -> Table:
+def units_table(order: list[Mapping[str, Any]]) -> Table:
+    """Every unit with its job, what came of it, and a link to its page."""
     rows = []
     for unit in order:
         told = unit["reason"] or told_of(unit)

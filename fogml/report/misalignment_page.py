@@ -25,8 +25,8 @@ def misalignment_page(values: Mapping[str, Any]) -> str:
         tiles=_tiles(values),
         slopes=slopes_over_tilts(values),
         region=region_figure(values),
-        result=_result(values),
-        methods=_methods(values),
+        result=result_table(values),
+        methods=methods_table(values),
         about=_about(values),
     )
 
@@ -70,7 +70,8 @@ def _within(se: float | None, unit: str) -> str:
     return "no standard error" if se is None else f"± {number(se)} {unit} (standard error)"
 
 
-def _result(values: Mapping[str, Any]) -> Table:
+def result_table(values: Mapping[str, Any]) -> Table:
+    """Scale factor, misalignment and the fixture's zero errors, with standard errors and intervals."""
     se, intervals = values["se"], values["intervals"]
     rows = []
     for label, key, unit in (
@@ -92,7 +93,8 @@ def _result(values: Mapping[str, Any]) -> Table:
     )
 
 
-def _methods(values: Mapping[str, Any]) -> Table:
+def methods_table(values: Mapping[str, Any]) -> Table:
+    """What other methods say of the same turns."""
     rows = [
         Row(
             (

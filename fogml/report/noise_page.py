@@ -31,13 +31,13 @@ def noise_page(noise: Mapping[str, Any]) -> str:
         verdict=_verdict(noise),
         tiles=_tiles(noise),
         allan=allan_plot(noise),
-        terms=_terms(noise),
-        table=_deviations(noise),
+        terms=terms_table(noise),
+        table=deviations_table(noise),
         findings=noticed(noise.get("findings", ())),
         warnings=[warning["message"] for warning in noise.get("warnings", ())],
         notes=[note for note in noise.get("notes", ()) if note not in warned],
         about=_about(noise),
-        replicates=_replicates(noise),
+        replicates=replicates_table(noise),
     )
 
 
@@ -85,7 +85,8 @@ def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
     return tiles
 
 
-def _terms(noise: Mapping[str, Any]) -> Table:
+def terms_table(noise: Mapping[str, Any]) -> Table:
+    """Every noise term with its interval, and whether the data show it."""
     rows = []
     for key, words in TERM_WORDS.items():
         term = noise["terms"].get(key) or {}
@@ -100,7 +101,8 @@ def _terms(noise: Mapping[str, Any]) -> Table:
     return Table(f"Term | >Value | >{level:.0f} % interval | Unit | In the data", rows)
 
 
-def _deviations(noise: Mapping[str, Any]) -> Table:
+def deviations_table(noise: Mapping[str, Any]) -> Table:
+    """Allan deviations with their intervals."""
     intervals = noise.get("ci") or [[None, None]] * len(noise["taus_s"])
     return Table(
         ">τ [s] | >Allan deviation [deg/h] | >Interval [deg/h]",
@@ -143,7 +145,7 @@ def _about(noise: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
-def _replicates(noise: Mapping[str, Any]) -> Table | None:
+def replicates_table(noise: Mapping[str, Any]) -> Table | None:
     """N of each run alone, where several share their terms."""
     runs = noise.get("runs") or ()
     if len(runs) < 2:

@@ -29,7 +29,7 @@ def north_page(values: Mapping[str, Any]) -> str:
         tiles=_tiles(values),
         circle=error_by_azimuth(values),
         map=error_map(values),
-        ways=None if recorded else _ways(values),
+        ways=None if recorded else ways_table(values),
         quiet=None if recorded else _quiet(values),
         stays=_stays(values) if recorded else None,
         about=_about(values),
@@ -91,7 +91,8 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
     return tiles
 
 
-def _ways(values: Mapping[str, Any]) -> Table:
+def ways_table(values: Mapping[str, Any]) -> Table:
+    """What each way to spend the time comes to; the simulated one is marked."""
     rows = [
         Row(
             (

@@ -190,15 +190,18 @@ def plan_page(values: Mapping[str, Any]) -> str:
             for run in values["runs"]
         ],
         errors=errors_drawing(values),
-        wanted=_wanted(values),
+        wanted=wanted_table(values),
         correlations=_correlations(values),
         separations=_separations(values),
-        rehearsal=rehearsal_table(
-            [Rehearsed(**{**r, "named_as": tuple(r["named_as"])}) for r in values.get("rehearsal", ())],
-            {id: declared.title for id, declared in effects().items()},
-        ),
+        rehearsal=planned_rehearsal(values),
         about=_about(values),
     )
+
+
+def planned_rehearsal(values: Mapping[str, Any]) -> Table | None:
+    """What a diagnosis of the planned runs would name; None where it was not asked for."""
+    rehearsal = [Rehearsed(**{**r, "named_as": tuple(r["named_as"])}) for r in values.get("rehearsal", ())]
+    return rehearsal_table(rehearsal, {id: declared.title for id, declared in effects().items()})
 
 
 def _verdict(values: Mapping[str, Any]) -> list[str]:
@@ -232,7 +235,8 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
     return tiles
 
 
-def _wanted(values: Mapping[str, Any]) -> Table | None:
+def wanted_table(values: Mapping[str, Any]) -> Table | None:
+    """Expected standard errors of what is wanted; None where nothing is."""
     if not values["wanted"]:
         return None
     rows = [

@@ -204,7 +204,7 @@ def sweep_page(study: Mapping[str, Any], judgement: Judgement | None = None) -> 
         history=history(study),
         importance=importance_bars(study),
         pareto=pareto_front(study),
-        pareto_table=_pareto_table(study),
+        pareto_table=pareto_table(study),
         judged=[] if judgement is None else [(run.run, metrics_table(run)) for run in judgement.test],
         in_time=None
         if worst is None or judgement is None
@@ -295,7 +295,8 @@ def _winner(study: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
-def _pareto_table(study: Mapping[str, Any]) -> Table:
+def pareto_table(study: Mapping[str, Any]) -> Table:
+    """Trials that none beats in every objective, the winner marked."""
     rows = []
     for place in study["pareto"][:_MOST_ROWS]:
         trial = study["trials"][place]

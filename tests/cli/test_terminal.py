@@ -8,8 +8,10 @@ import sys
 
 import pytest
 
-from fogml.cli.diagnose_job import rehearsal_rows
 from fogml.cli.terminal import Terminal, fitted, number, span
+from fogml.gap.result_parts import Rehearsed
+from fogml.report.gap_tables_ahead import rehearsal_table
+from fogml.report.tables import Row, Table
 from fogml.twin.registry import effects
 
 WAYS = [
@@ -28,21 +30,33 @@ def test_words_stay_whole_where_they_fit(columns: int, monkeypatch, capsys) -> N
     assert {word for row in [HEADER, *WAYS] for cell in row for word in cell.split()} <= set(told.split())
 
 
-def test_the_longest_names_of_effects_stay_whole_at_80(monkeypatch, capsys) -> None:
+def test_words_of_a_page_s_table_stay_whole_at_80(monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    longest = sorted(effects(), key=len)[-2:]
-    rehearsed = {"form": "usual", "size": "usual", "length": 1.5e7, "outcome": "named"}
-    head, rows = rehearsal_rows(
-        [
-            {**rehearsed, "effect": longest[1], "named_as": longest[::-1]},
-            {**rehearsed, "effect": longest[0], "named_as": [longest[0]]},
-        ]
-    )
-    assert [row[-1] for row in rows] == [f"named as {longest[1]}, {longest[0]}", "named"]
-    Terminal().table("What these runs would name", head, rows)
+    names = {id: declared.title for id, declared in effects().items()}
+    first, second = sorted(names, key=lambda id: max(map(len, names[id].split())))[-2:]
+    likely = {"form": "usual", "size": "usual", "probability": 0.42}
+    rehearsed = [
+        Rehearsed(effect=second, length=15.0, outcome="mistaken", named_as=(first,), **likely),
+        Rehearsed(effect=first, length=2.5, outcome="missed", named_as=(), **likely),
+    ]
+    table = rehearsal_table(rehearsed, names)
+    Terminal().show(table, "What these runs would name")
     told = capsys.readouterr().out
     assert max(map(len, told.splitlines())) <= 80
-    assert {longest[0], longest[1], longest[1] + ","} <= set(told.split())
+    assert {word for row in table.rows for cell in row.cells for word in cell.split()} <= set(told.split())
+
+
+def test_a_page_s_table_has_units_its_caption_and_what_is_chosen(capsys) -> None:
+    rows = [Row(("a", "1 × 10⁻⁶"), "chosen"), Row(("b", "2"), "baseline"), ("c", "3")]
+    Terminal().show(Table("Model | >Rms [deg/h]", rows, "What is left."), most=2)
+    Terminal().show(None, "nothing")
+    told = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert [line for line in told if line and set("".join(line)) != {"─"}] == [
+        ["What", "is", "left."],
+        ["Model", "Rms", "[deg/h]", "chosen"],
+        ["a", "1×10⁻⁶", "✓"],
+        ["b", "2"],
+    ]
 
 
 def test_no_figure_is_lost_where_they_do_not_fit(monkeypatch, capsys) -> None:
