@@ -123,6 +123,7 @@ def told(
         "beside": {name: by_reality(held)[ALL] for name, held in beside.items() if held},
         "same_twin": list(same_twin(marks)),
         "cases": {name: sum(m.truth.reality == name for m in marks) for name in realities},
+        "code": sorted({m.code or "" for m in marks}),
     }
 
 
@@ -194,7 +195,8 @@ def page(values: Mapping[str, Any]) -> str:
             "# The diagnosis by reality",
             "",
             f"Synthetic cases at 10 s, method {values['method']}, seed {values['seed']}, which is {kept}. "
-            f"Cases: {counted}. Each figure with its 95 % interval "
+            f"Cases: {counted}, answered by {plural(len(values['code']), 'state')} of the code. "
+            "Each figure with its 95 % interval "
             "(Wilson's for shares) and how many cases, names or runs it rests on; wanted figures ask for 400 "
             "cases each. Forms of the first reality lie near the catalogue's, those of the others were drawn "
             "without asking how near. A far form that is called by its name is right; called unknown it is a "
