@@ -30,6 +30,17 @@ def with_slashes(path: str | Path, *folders: Path) -> str:
     return f"; did you mean {printable(slashed)}?" if found else ""
 
 
+def not_there(path: str | Path) -> bool:
+    """Whether a path is known to lead to nothing; not of one that can't be looked for."""
+    try:
+        os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return True
+    except (OSError, ValueError):
+        pass
+    return False
+
+
 def nearest_folder(path: Path) -> Path:
     """The folder itself, or the nearest parent that is there."""
     while not path.exists():

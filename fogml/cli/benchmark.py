@@ -16,22 +16,26 @@ from fogml.errors import InputError, counted
 from fogml.json_files import write_json
 from fogml.outputs import whole_file, whole_folder
 
+_NO_ROUND = "no folder is given; name the round's folder"
+
 
 class RoundSettings(Settings):
     """What every job on a round takes."""
 
-    directory: Annotated[str | None, argument("DIR", "The round's folder.", reads=True)] = None
+    directory: Annotated[
+        str | None,
+        argument(
+            "DIR",
+            "The round's folder.",
+            reads=True,
+            needed=_NO_ROUND,
+            lost="no such folder; make a round first: fogml benchmark make DIR",
+        ),
+    ] = None
 
     def folder(self) -> str:
-        """The round's folder.
-
-        Raises
-        ------
-        InputError
-            If none is named.
-        """
-        if not self.directory:
-            raise InputError("no folder is given; name the round's folder")
+        """The round's folder."""
+        assert self.directory
         return self.directory
 
 
@@ -42,6 +46,10 @@ class MakeSettings(RoundSettings):
     """
 
     job: ClassVar[str] = "fogml.cli.benchmark:make_and_tell"
+    directory: Annotated[
+        str | None,
+        argument("DIR", "The round's folder.", writes=True, needed=_NO_ROUND),
+    ] = None
     seed: Annotated[int, option("Seed of an open round; 2026 is the one whose results ship.")] = Field(
         SEED, ge=0, lt=1_000_000
     )
@@ -64,10 +72,13 @@ class RunSettings(RoundSettings):
             "--method",
             metavar="NAME",
             known="fogml.models.names:MODEL_NAMES",
+            needed="no method is given; name one: --method auto",
         ),
     ] = []
     features: options.Features = None
-    code: Annotated[str | None, option("Where module:function lies.", metavar="FOLDER", reads=True)] = None
+    code: Annotated[
+        str | None, option("Where module:function lies.", metavar="FOLDER", reads=True, lost="no such folder")
+    ] = None
     name: Annotated[str | None, option("What the answers are called.", metavar="NAME")] = None
     workers: options.Workers = 2
     limit: Annotated[float, option("Time that a case may take.", metavar="SECONDS")] = 600.0
@@ -125,8 +136,6 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     from fogml.blind.run import RunPlan, run_cases
     from fogml.cli.blind_job import answer
 
-    if not settings.methods:
-        raise InputError("no method is given; name one: --method auto")
     if len(settings.methods) > 1 and settings.name:
         raise InputError("--name: the answers of several methods can't have one name")
 

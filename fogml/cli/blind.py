@@ -32,24 +32,27 @@ Final = Annotated[
     bool, option("Use a final seed; the use is recorded in the ledger and the page.", "--final")
 ]
 Ledger = Annotated[str, option("Where uses of final seeds are kept.", metavar="FILE", writes=True)]
+_NO_SUITE = "no folder is given; name the suite's folder"
 LEDGER = "experiments/gap_blind/final_uses.json"
 
 
 class SuiteSettings(Settings):
     """What every job on a suite takes."""
 
-    directory: Annotated[str | None, argument("DIR", "The suite's folder.", reads=True)] = None
+    directory: Annotated[
+        str | None,
+        argument(
+            "DIR",
+            "The suite's folder.",
+            reads=True,
+            needed=_NO_SUITE,
+            lost="no such folder; make a suite first: fogml blind make DIR",
+        ),
+    ] = None
 
     def folder(self) -> BlindFolder:
-        """The suite.
-
-        Raises
-        ------
-        InputError
-            If none is named.
-        """
-        if not self.directory:
-            raise InputError("no folder is given; name the suite's folder")
+        """The suite."""
+        assert self.directory
         return BlindFolder(Path(self.directory))
 
 
@@ -60,6 +63,9 @@ class MakeSettings(SuiteSettings):
     """
 
     job: ClassVar[str] = "fogml.cli.blind_job:make_and_tell"
+    directory: Annotated[
+        str | None, argument("DIR", "The suite's folder.", writes=True, needed=_NO_SUITE)
+    ] = None
     count: Annotated[int, option("Cases.", "--count", "-n")] = 1000
     first: Annotated[int, option("Number of the first one.")] = 1
     sample: Annotated[float, option("Interval.", metavar="SECONDS")] = 10.0
@@ -124,7 +130,9 @@ class RunSettings(SuiteSettings):
             known="fogml.blind.methods:METHODS",
         ),
     ] = [DIAGNOSIS]
-    code: Annotated[str | None, option("Where module:function lies.", metavar="FOLDER", reads=True)] = None
+    code: Annotated[
+        str | None, option("Where module:function lies.", metavar="FOLDER", reads=True, lost="no such folder")
+    ] = None
     name: Annotated[str | None, option("What the answers are called.", metavar="NAME")] = None
     workers: options.Workers = 2
     threads: Annotated[int, option("Threads of each process.")] = 1
@@ -173,11 +181,22 @@ class MergeSettings(Settings):
 
     job: ClassVar[str] = "fogml.cli.blind_job:merge_and_write"
     marks: Annotated[
-        list[str], argument("MARKS...", "Files marks.json.gz of a suite's parts.", reads=True)
+        list[str],
+        argument("MARKS...", "Files marks.json.gz of a suite's parts.", reads=True, lost="no such file"),
     ] = []
     final: Final = False
     ledger: Ledger = LEDGER
-    out: options.FolderIfNamed = None
+    out: Annotated[
+        str | None,
+        option(
+            "Folder for the score.",
+            "--out",
+            "-o",
+            metavar="DIR",
+            writes=True,
+            needed="no --out is given; name a folder for the score",
+        ),
+    ] = None
 
 
 COMMANDS = {"make": MakeSettings, "run": RunSettings, "score": ScoreSettings, "merge": MergeSettings}

@@ -207,8 +207,7 @@ def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
     from fogml.blind.scoring.values import score_values
     from fogml.report.blind_tables import headline
 
-    if not settings.out:
-        raise InputError("nothing is given for 'out'; name a folder for the score: --out DIR")
+    assert settings.out
     marks = merged([Path(path) for path in settings.marks])
     values = score_values(marks, Path(settings.ledger) if settings.final else None)
     out = Path(settings.out)

@@ -56,8 +56,6 @@ def _makers(settings: CompareSettings) -> dict[str, partial]:
 
 
 def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Terminal) -> Comparison:
-    if not settings.runs:
-        raise InputError("no training run is given; name the training runs before --test")
     if settings.leave_one_out == bool(settings.test):
         raise InputError("give test runs after --test, or --leave-one-out without --test")
     train_runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)

@@ -102,8 +102,6 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
 
     Of runs of several units each has them in a folder of its own, beside ``units.json`` and its page.
     """
-    if not settings.runs:
-        raise InputError("no run is given; name the runs to diagnose before --held-out")
     both = sorted(set(settings.runs) & set(settings.held_out))
     if both:
         raise InputError(f"{', '.join(both)}: both a fit run and held out; hold out another run")

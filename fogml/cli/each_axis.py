@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from fogml.cli.given import load
-from fogml.cli.options import SHIPPED_RUNS
-from fogml.cli.settings import SHIPPED, Settings, given_settings
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError, printable
+from fogml.errors import InputError
 from fogml.outputs import whole_folder
 
 SCHEMA = "fogml.axes/1"
@@ -19,7 +18,7 @@ SCHEMA = "fogml.axes/1"
 
 def do_job(settings: Settings, command: str, terminal: Terminal) -> bool:
     """Do a command's job; on files of several gyros once an axis. False where a limit was not met."""
-    _check_runs(settings)
+    settings.check_given()
     from fogml.runs.three_axes import SeveralAxes
 
     job = load(settings.job)
@@ -29,18 +28,6 @@ def do_job(settings: Settings, command: str, terminal: Terminal) -> bool:
         if "axis" not in type(settings).model_fields:
             raise
         return _each(settings, command, several.axes, terminal)
-
-
-def _check_runs(settings: Settings) -> None:
-    """Hold that every run is there, before the job loads what it needs and reads the first."""
-    for name, given in given_settings(type(settings)).items():
-        if given.known == SHIPPED_RUNS:
-            value = getattr(settings, name) or []
-            for path in [value] if isinstance(value, str) else value:
-                # One that can't be looked for is refused with its reason where it is read.
-                with suppress(OSError):
-                    if not (path.startswith(SHIPPED) or Path(path).exists()):
-                        raise InputError(f"{printable(path)}: no such file")
 
 
 class _OfAxis(Terminal):

@@ -46,8 +46,7 @@ def write_batch(batch: Mapping[str, Any], folder: Path, name: str) -> None:
 
 def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     """Do every unit's job, write the fleet's results, print them; whether all are done and meet limits."""
-    if settings.manifest is None:
-        raise InputError("no manifest is given; name a CSV or YAML file of units")
+    assert settings.manifest
     units = read_manifest(settings.manifest)
     _check(settings)
     tasks = _tasks(settings, units)

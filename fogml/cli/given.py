@@ -38,6 +38,10 @@ class Given:
     known
         Names of what ships or is built in, or ``module:names``, listed or given by a function; such a name
         is no file.
+    needed
+        What is said where the job can't do without it and nothing is given.
+    lost
+        What is said of a path that is not there, before anything loads; none for one that the job looks for.
     """
 
     help: str
@@ -50,6 +54,8 @@ class Given:
     reads: bool = False
     writes: bool = False
     known: str | tuple[str, ...] = ()
+    needed: str = ""
+    lost: str = ""
 
     def known_names(self) -> Sequence[str]:
         """Names of what ships or is built in."""

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field
 from fogml.cli import options
 from fogml.cli.given import argument, option
 from fogml.cli.settings import Settings
+from fogml.errors import InputError
 
 WAYS = ("plain", "drift-observing", "palindrome", "coarse-fine")
 """Ways to spend the time of a seek, by name."""
@@ -39,6 +40,8 @@ class MisalignmentSettings(Settings):
             "FILE",
             "Table with state, tilt [deg], rate [deg/s], output [unit], and segment or time.",
             reads=True,
+            needed="no file is given; name the table of turns and rests",
+            lost="no such file",
         ),
     ] = None
     cross_tilt: Annotated[
@@ -108,6 +111,12 @@ class RateSettings(Settings):
     repair: options.Repair = False
     out: options.FolderIfNamed = None
 
+    def check_given(self) -> None:
+        """As `Settings.check_given`, and that runs or a twin are given, not both."""
+        super().check_given()
+        if bool(self.runs) == bool(self.twin):
+            raise InputError("give recorded runs, or --twin to test a twin; one of the two")
+
 
 class NorthSettings(Settings):
     """North from several positions, and what a drift does to it: the error, and where it is nothing.
@@ -119,7 +128,12 @@ class NorthSettings(Settings):
     job: ClassVar[str] = "fogml.cli.lab_jobs:north_and_write"
     positions: Annotated[
         str | None,
-        option("A run with a column position, 1 to 4, or the table's angle.", metavar="FILE", reads=True),
+        option(
+            "A run with a column position, 1 to 4, or the table's angle.",
+            metavar="FILE",
+            reads=True,
+            lost="no such file",
+        ),
     ] = None
     azimuth: Annotated[float | None, option("Simulate a seek at this azimuth.", metavar="DEG")] = None
     latitude: Annotated[float | None, option("Latitude.", metavar="DEG")] = None
@@ -162,6 +176,12 @@ class NorthSettings(Settings):
     repair: options.Repair = False
     out: options.FolderIfNamed = None
 
+    def check_given(self) -> None:
+        """As `Settings.check_given`, and that a run is given or what a simulation needs."""
+        super().check_given()
+        if not self.positions and (self.azimuth is None or self.latitude is None):
+            raise InputError("give a run with --positions, or --azimuth and --latitude for a simulation")
+
 
 class AcceptanceSettings(Settings):
     """The acceptance report of one gyro: every figure that its runs tell, limits and verdict.
@@ -176,9 +196,13 @@ class AcceptanceSettings(Settings):
         list[str],
         argument("RUN...", "Runs of one unit and axis.", reads=True, known=options.SHIPPED_RUNS),
     ] = []
-    model: Annotated[str | None, option("Folder of the unit's model.", metavar="DIR", reads=True)] = None
+    model: Annotated[
+        str | None,
+        option("Folder of the unit's model.", metavar="DIR", reads=True, lost=options.LOST_MODEL),
+    ] = None
     limits: Annotated[
-        str | None, option("Limits (YAML): customer, document, limits.", metavar="FILE", reads=True)
+        str | None,
+        option("Limits (YAML): customer, document, limits.", metavar="FILE", reads=True, lost="no such file"),
     ] = None
     noise: Annotated[
         str | None,
@@ -206,7 +230,13 @@ class BatchSettings(Settings):
     job: ClassVar[str] = "fogml.cli.lab_acceptance_job:batch_and_write"
     reports: Annotated[
         list[str],
-        argument("REPORT...", "Files acceptance.json, or the folders that hold them.", reads=True),
+        argument(
+            "REPORT...",
+            "Files acceptance.json, or the folders that hold them.",
+            reads=True,
+            needed="no report is given; name files acceptance.json, or the folders that hold them",
+            lost="no such file; name acceptance reports (acceptance.json) or their folders",
+        ),
     ] = []
     title: Annotated[str, option("Heading of the page.")] = "Batch"
     out: options.FolderIfNamed = None

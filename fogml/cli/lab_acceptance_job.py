@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from fogml.cli.lab import AcceptanceSettings, BatchSettings
 from fogml.cli.runs import open_runs, tell
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -99,9 +98,6 @@ def batch_and_write(settings: BatchSettings, terminal: Terminal) -> bool:
     """Gather reports, write the batch where a folder is named, print it; whether all are accepted."""
     from fogml.lab.acceptance import ACCEPTED
     from fogml.lab.batch import batch_json, read_reports
-
-    if not settings.reports:
-        raise InputError("no report is given; name files acceptance.json, or the folders that hold them")
 
     def make() -> dict[str, Any]:
         home = None if settings.out is None else Path(settings.out)

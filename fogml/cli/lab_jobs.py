@@ -20,9 +20,7 @@ from fogml.numerals import to_error, with_error
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
     """Find scale factor and misalignment, write them where a folder is named, and print them."""
-    if not settings.file:
-        raise InputError("no file is given; name the table of turns and rests")
-    file = settings.file
+    file = str(settings.file)
 
     def make() -> dict[str, Any]:
         with terminal.work(f"reading {file}"):
@@ -45,8 +43,6 @@ def _print_misalignment(values: dict[str, Any], terminal: Terminal) -> None:
 
 def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:
     """Read the tests on a rate table, write them where a folder is named, and print them."""
-    if bool(settings.runs) == bool(settings.twin):
-        raise InputError("give recorded runs, or --twin to test a twin; one of the two")
     page = "fogml.report.rate_page:rate_page"
     tell("lab rate", settings, terminal, lambda: _values(settings, terminal), page, _print_rate)
 
@@ -103,8 +99,7 @@ def _check(settings: NorthSettings) -> None:
         horizontal_rate(settings.latitude)
     if settings.positions:
         return
-    if settings.azimuth is None or settings.latitude is None:
-        raise InputError("give a run with --positions, or --azimuth and --latitude for a simulation")
+    assert settings.azimuth is not None
     if abs(settings.azimuth) > 1e6 or settings.azimuth != settings.azimuth:
         raise InputError(f"azimuth {settings.azimuth:g} deg: a finite number is needed")
     if not 0.0 <= settings.noise < float("inf"):

@@ -41,6 +41,7 @@ class TrainSettings(options.LimitSettings):
             "Compensate the causes that a diagnosis named: its folder; 'auto' is judged beside it.",
             metavar="DIR",
             reads=True,
+            lost="no such folder; name the one that 'fogml diagnose' wrote",
         ),
     ] = None
     causes: Annotated[
@@ -72,7 +73,7 @@ class CompareSettings(options.LimitSettings):
 
     job: ClassVar[str] = "fogml.cli.compare_job:compare_and_write"
     runs: options.Runs = []
-    test: options.Tests = []
+    test: options.TestsIfAny = []
     leave_one_out: Annotated[
         bool,
         option("Without --test: judge each run by models fitted on the others.", "--leave-one-out/--split"),
@@ -106,10 +107,23 @@ class CompensateSettings(Settings):
     job: ClassVar[str] = "fogml.cli.model_jobs:compensate_and_write"
     run: Annotated[
         str | None,
-        argument("RUN", "The run to compensate.", reads=True, known=options.SHIPPED_RUNS),
+        argument(
+            "RUN",
+            "The run to compensate.",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+            needed="no run is given; name the run to compensate",
+        ),
     ] = None
     model: Annotated[
-        str | None, option("Folder of the model, or of the results that hold it.", metavar="DIR", reads=True)
+        str | None,
+        option(
+            "Folder of the model, or of the results that hold it.",
+            metavar="DIR",
+            reads=True,
+            needed="no --model is given; name the folder of the model, e.g. train-results/model",
+            lost=options.LOST_MODEL,
+        ),
     ] = None
     any_unit: options.AnyUnit = False
     axis: options.Axis = None
@@ -141,7 +155,13 @@ class ExportJobSettings(Settings):
         list[str],
         BeforeValidator(_several),
         PlainSerializer(_one_as_text),
-        argument("MODEL...", "Folder of the model, or of the results of three axes.", reads=True),
+        argument(
+            "MODEL...",
+            "Folder of the model, or of the results of three axes.",
+            reads=True,
+            needed="no model is given; name the folder of the model, e.g. train-results/model",
+            lost=options.LOST_MODEL,
+        ),
     ] = []
     to: Annotated[
         str,
@@ -174,7 +194,12 @@ class ExportJobSettings(Settings):
     ] = None
     matrix: Annotated[
         str | None,
-        option("3 x 3 matrix (YAML) that three axes are multiplied by.", metavar="FILE", reads=True),
+        option(
+            "3 x 3 matrix (YAML) that three axes are multiplied by.",
+            metavar="FILE",
+            reads=True,
+            lost="no such file",
+        ),
     ] = None
     train: Annotated[
         list[str],
@@ -216,7 +241,6 @@ class SweepSettings(Settings):
 
     job: ClassVar[str] = "fogml.cli.sweep_job:sweep_and_write"
     config_argument: ClassVar[str] = "YAML file of schema fogml.sweep/1."
-    needed_keys: ClassVar[tuple[str, ...]] = ("runs",)
     schema_: Literal["fogml.sweep/1"] = Field("fogml.sweep/1", alias="schema")
     name: Annotated[str, option("Name of the study in its storage.", metavar="NAME")] = "sweep"
     runs: Annotated[
@@ -227,9 +251,10 @@ class SweepSettings(Settings):
             metavar="RUN",
             reads=True,
             known=options.SHIPPED_RUNS,
+            needed="no training run is given; state 'runs' in the file, or --run",
         ),
     ] = []
-    test: options.Tests = []
+    test: options.TestsIfAny = []
     space: Annotated[Space, BeforeValidator(_understood)]
     objectives: Annotated[list[str], BeforeValidator(options.names_list)] = ["rms"]
     folds: Literal["auto", "time", "runs"] = "auto"

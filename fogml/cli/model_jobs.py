@@ -35,12 +35,7 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     """Compensate a run block by block into a file, and print how many samples got which flag."""
     from fogml.models.saved import load_model
 
-    if not settings.run:
-        raise InputError("no run is given; name the run to compensate")
-    if not settings.model:
-        raise InputError("no --model is given; name the folder of the model, e.g. train-results/model")
-    if not settings.out:
-        raise InputError("no --out is given; name the file to write, .csv or .parquet")
+    assert settings.run and settings.model and settings.out
     out = Path(settings.out)
     if out.exists() and Path(settings.run).exists() and out.samefile(settings.run):
         raise InputError(f"{out}: is the run itself; choose another --out")
@@ -155,8 +150,6 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
     from fogml.export.tables import TableSettings, export_tables
     from fogml.models.saved import load_model
 
-    if not settings.model:
-        raise InputError("no model is given; name the folder of the model, e.g. train-results/model")
     with whole_folder(settings.out) as folder:
         models = [load_model(path) for named in settings.model for path in axis_folders(named)]
         _check_form(settings, len(models))

@@ -27,8 +27,7 @@ from fogml.runs.run import Run
 
 def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
     """Keep new runs, judge every unit's, write and print it; whether all were used and no unit changed."""
-    if not settings.model:
-        raise InputError("no model is given; name its folder, or that of a fleet's results")
+    assert settings.model
     home = Path(settings.out)
     if home.exists() and not home.is_dir():
         raise InputError(f"{home}: is a file, a folder was expected; choose another --out")

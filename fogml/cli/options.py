@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
 from fogml.cli.given import argument, option
-from fogml.cli.settings import Settings
+from fogml.cli.settings import SHIPPED_RUNS, Settings
 from fogml.errors import quoted
 from fogml.yaml_text import parse_yaml
 
@@ -73,19 +74,27 @@ Repair = Annotated[
 ]
 EFFECTS = "fogml.twin.registry:effects"
 TWINS = "fogml.twin.twin_file:twin_names"
-SHIPPED_RUNS = "fogml.cli.runs:shipped_places"
-Runs = Annotated[list[str], argument("RUN...", "Training runs.", reads=True, known=SHIPPED_RUNS)]
-Tests = Annotated[
+Runs = Annotated[
     list[str],
-    option(
-        "Runs to judge on; takes several, may be repeated.",
-        "--test",
-        metavar="RUN...",
-        spread=True,
+    argument(
+        "RUN...",
+        "Training runs.",
         reads=True,
         known=SHIPPED_RUNS,
+        needed="no training run is given; name the training runs before --test",
     ),
 ]
+_TESTS = option(
+    "Runs to judge on; takes several, may be repeated.",
+    "--test",
+    metavar="RUN...",
+    spread=True,
+    reads=True,
+    known=SHIPPED_RUNS,
+)
+Tests = Annotated[list[str], replace(_TESTS, needed="no test run is given; name at least one after --test")]
+TestsIfAny = Annotated[list[str], _TESTS]
+LOST_MODEL = "no such folder; name the one that 'fogml train' wrote the model into, e.g. DIR/model"
 Model = Annotated[str, option("Name of the model.", metavar="NAME", known="fogml.models.names:MODEL_NAMES")]
 Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".', metavar="FEATURES")]
 Parameters = Annotated[
@@ -131,7 +140,15 @@ _FOLDER = option("Folder for the results.", "--out", "-o", metavar="DIR", writes
 Folder = Annotated[str, _FOLDER]
 FolderIfNamed = Annotated[str | None, _FOLDER]
 FileToWrite = Annotated[
-    str | None, option("File to write: .csv or .parquet.", "--out", "-o", metavar="FILE", writes=True)
+    str | None,
+    option(
+        "File to write: .csv or .parquet.",
+        "--out",
+        "-o",
+        metavar="FILE",
+        writes=True,
+        needed="no --out is given; name the file to write, .csv or .parquet",
+    ),
 ]
 
 

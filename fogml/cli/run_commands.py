@@ -32,7 +32,16 @@ class ImportSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.run_jobs:import_and_write"
-    file: Annotated[str | None, argument("FILE", "The logger's file.", reads=True)] = None
+    file: Annotated[
+        str | None,
+        argument(
+            "FILE",
+            "The logger's file.",
+            reads=True,
+            needed="no file is given; name the logger's file",
+            lost="no such file",
+        ),
+    ] = None
     profile: Annotated[
         str | None,
         option(
@@ -62,7 +71,14 @@ class InspectSettings(Settings):
 
     job: ClassVar[str] = "fogml.cli.run_jobs:inspect_and_write"
     runs: Annotated[
-        list[str], argument("RUN...", "Runs to look into.", reads=True, known=options.SHIPPED_RUNS)
+        list[str],
+        argument(
+            "RUN...",
+            "Runs to look into.",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+            needed="no run is given; name at least one",
+        ),
     ] = []
     axis: options.Axis = None
     repair: options.Repair = False
@@ -85,6 +101,7 @@ class NoiseSettings(Settings):
             "A run, best at constant temperature; several share their terms.",
             reads=True,
             known=options.SHIPPED_RUNS,
+            needed="no run is given; name one",
         ),
     ] = None
     overlapping: Annotated[bool, option("Kind of estimator.", "--overlapping/--not-overlapping")] = True
@@ -148,7 +165,13 @@ class FleetSettings(options.LimitSettings):
     job: ClassVar[str] = "fogml.cli.fleet_job:fleet_and_write"
     manifest: Annotated[
         str | None,
-        argument("MANIFEST", "CSV or YAML of units: unit, job, train, test, axis.", reads=True),
+        argument(
+            "MANIFEST",
+            "CSV or YAML of units: unit, job, train, test, axis.",
+            reads=True,
+            needed="no manifest is given; name a CSV or YAML file of units",
+            lost="no such file; a manifest was expected, CSV or YAML",
+        ),
     ] = None
     model: options.Model = "auto"
     features: options.Features = None
@@ -159,11 +182,21 @@ class FleetSettings(options.LimitSettings):
     ] = FORM
     prior: Annotated[
         str | None,
-        option("Draw constants to those of an earlier fleet.", metavar="FLEET.JSON", reads=True),
+        option(
+            "Draw constants to those of an earlier fleet.",
+            metavar="FLEET.JSON",
+            reads=True,
+            lost="no such file; a fleet.json was expected",
+        ),
     ] = None
     acceptance_limits: Annotated[
         str | None,
-        option("Limits of acceptance reports (YAML), as of 'lab acceptance'.", metavar="FILE", reads=True),
+        option(
+            "Limits of acceptance reports (YAML), as of 'lab acceptance'.",
+            metavar="FILE",
+            reads=True,
+            lost="no such file",
+        ),
     ] = None
     twin: options.Twin = "nominal"
     next_run: options.NextRun = True
@@ -209,7 +242,13 @@ class MonitorSettings(Settings):
     job: ClassVar[str] = "fogml.cli.monitor_job:monitor_and_write"
     model: Annotated[
         str | None,
-        argument("MODEL", "Folder of the model, or of a fleet's results with a model per unit.", reads=True),
+        argument(
+            "MODEL",
+            "Folder of the model, or of a fleet's results with a model per unit.",
+            reads=True,
+            needed="no model is given; name its folder, or that of a fleet's results",
+            lost=options.LOST_MODEL,
+        ),
     ] = None
     runs: Annotated[
         list[str],

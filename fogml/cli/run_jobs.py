@@ -30,8 +30,7 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
     from fogml.runs.profiles import import_recording, profile_names
     from fogml.runs.writing import check_side_file, write_run
 
-    if not settings.file:
-        raise InputError("no file is given; name the logger's file")
+    assert settings.file
     if settings.draft:
         _draft(settings, terminal)
         return
@@ -119,8 +118,6 @@ def _check_apart(file: str, out: str, names: Sequence[str]) -> None:
 
 def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:
     """Look into the runs, write what was found where an output folder is named, and print it."""
-    if not settings.runs:
-        raise InputError("no run is given; name at least one")
     runs: list[Run] = []
 
     def make() -> dict[str, Any]:
@@ -185,8 +182,7 @@ _STATISTICS = ("least", "greatest", "mean", "standard_deviation")
 
 def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
     """Tell the noise of a run, write it where an output folder is named, and print it."""
-    if not settings.run:
-        raise InputError("no run is given; name one")
+    assert settings.run
     if settings.to is not None:
         from fogml.export.noise_parameters import check_target
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from inspect import get_annotations
 from pathlib import Path
@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, ValidationInfo, field_validator
 from fogml import __version__
 from fogml.cli.given import Given, option
 from fogml.errors import InputError, known_are, listed, printable, quoted
-from fogml.folders import with_slashes
+from fogml.folders import not_there, with_slashes
 from fogml.locks import sole_writer
 from fogml.outputs import check_is_no_folder, whole_file
 from fogml.strict import Strict, first_fault
@@ -22,6 +22,8 @@ from fogml.yaml_text import read_yaml, yaml_text
 
 SHIPPED = "shipped:"
 """What a run's path begins with when it names a recording that ships."""
+SHIPPED_RUNS = "fogml.cli.runs:shipped_places"
+"""Where the names of recordings that ship are; a run of another name is a file."""
 
 
 class Settings(Strict):
@@ -38,8 +40,6 @@ class Settings(Strict):
     """Settings that name files to read."""
     written_keys: ClassVar[tuple[str, ...]] = ()
     """Settings that name files or folders to write."""
-    needed_keys: ClassVar[tuple[str, ...]] = ()
-    """Settings that the job asks for though a file may lack them; named with what a file has to have."""
     seed: Annotated[int, option("Seed of everything random.")] = Field(0, ge=0, lt=1 << 32)
 
     @classmethod
@@ -65,15 +65,29 @@ class Settings(Strict):
         source = config.name if config is not None else "settings"
         for key in [key for key in stated if key in cls.path_keys]:
             assert config is not None
-            _check_slashes(stated[key], f"{source}: '{key}': ", config.parent)
             stated[key] = _beside(stated[key], config.parent)
         given = {name: value for name, value in flags.items() if value is not None and value != []}
-        for key in [key for key in given if key in cls.path_keys]:
-            _check_slashes(given[key], "")
         try:
-            return cls.model_validate({**stated, **given})
+            settings = cls.model_validate({**stated, **given})
         except ValidationError as error:
             raise InputError(_message(cls, error, source, stated | given)) from None
+        for key, one in given_settings(cls).items():
+            from_file = config is not None and key in stated and key not in given
+            place, folders = (f"{source}: '{key}': ", [config.parent]) if config and from_file else ("", [])
+            _check_there(getattr(settings, key), one, place, folders)
+        return settings
+
+    def check_given(self) -> None:
+        """Hold that nothing is missing that the job can't do without.
+
+        Raises
+        ------
+        InputError
+            With what to give.
+        """
+        for key, one in given_settings(type(self)).items():
+            if one.needed and not getattr(self, key):
+                raise InputError(one.needed)
 
     def in_full(self) -> Self:
         """The settings with every path in full, to be run from anywhere; what ships keeps its name."""
@@ -160,11 +174,14 @@ def _beside(value: Any, folder: Path) -> Any:
     return value
 
 
-def _check_slashes(value: Any, place: str, *folders: Path) -> None:
-    """Refuse a path with backslashes that is there with slashes."""
-    for path in value if isinstance(value, list) else [value]:
-        if isinstance(path, str) and (hint := with_slashes(path, *folders)):
-            raise InputError(f"{place}{printable(path)}: no such file{hint}")
+def _check_there(value: Any, given: Given, place: str, folders: Sequence[Path]) -> None:
+    """Refuse a path that is not there, before the job loads; of others one that is there with slashes."""
+    lost = given.lost or ("no such file" if given.known == SHIPPED_RUNS else "")
+    paths = (value if isinstance(value, list) else [value]) if given.reads else []
+    for path in (path for path in paths if isinstance(path, str) and not path.startswith(SHIPPED)):
+        hint = with_slashes(path, *folders)
+        if hint or (lost and not_there(path)):
+            raise InputError(f"{place}{printable(path)}: {'no such file' if hint else lost}{hint}")
 
 
 def absolute(path: str) -> str:
@@ -185,7 +202,8 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
     place = f"{source}: " if key in stated else ""
     if first["type"] == "missing":
         lacking = [quoted(".".join(map(str, e["loc"]))) for e in error.errors() if e["type"] == "missing"]
-        lacking += [quoted(key) for key in settings.needed_keys if not stated.get(key)]
+        needed = [name for name, one in given_settings(settings).items() if one.needed]
+        lacking += [quoted(name) for name in needed if not stated.get(name)]
         return f"{place}nothing is given for {listed(lacking)}"
     reason = str(first["ctx"]["error"]) if "ctx" in first and "error" in first["ctx"] else first["msg"]
     return f"{place}'{key}': {reason} (found {quoted(first['input'])})"

@@ -59,8 +59,6 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
     from fogml.report.sweep_page import sweep_page
     from fogml.tuning.sweep import run_sweep, study_json
 
-    if not settings.runs:
-        raise InputError("no training run is given; state 'runs' in the file, or --run")
     tracker = None if settings.track is None else Tracker(settings.track, "fogml sweep", terminal.note)
     if not settings.averaging > 0.0:
         raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")

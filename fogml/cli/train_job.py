@@ -65,10 +65,6 @@ def check_settings(settings: TrainSettings | CompareSettings) -> None:
 
 def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:
     """The training runs and the test runs, read and checked."""
-    if not settings.runs:
-        raise InputError("no training run is given; name the training runs before --test")
-    if not settings.test:
-        raise InputError("no test run is given; name at least one after --test")
     train_runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
     test_runs = open_runs(settings.test, terminal, repair=settings.repair, axis=settings.axis)
     check_turn_on_band(settings.turn_on_band, (*train_runs, *test_runs))

@@ -37,11 +37,23 @@ class ReplaySettings(Settings):
     job: ClassVar[str] = "fogml.cli.twin_jobs:replay_and_write"
     twin: Annotated[
         str | None,
-        argument("TWIN", "A twin file or name, or a simulator's output.", reads=True, known=options.TWINS),
+        argument(
+            "TWIN",
+            "A twin file or name, or a simulator's output.",
+            reads=True,
+            known=options.TWINS,
+            needed="no twin is given; name a file, or one that ships, e.g. tactical",
+        ),
     ] = None
     run: Annotated[
         str | None,
-        argument("RUN", "The run whose inputs to take.", reads=True, known=options.SHIPPED_RUNS),
+        argument(
+            "RUN",
+            "The run whose inputs to take.",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+            needed="no run is given; name the run to replay",
+        ),
     ] = None
     only: Annotated[
         str | None,
@@ -82,7 +94,14 @@ class DiagnoseSettings(Settings):
 
     job: ClassVar[str] = "fogml.cli.diagnose_job:diagnose_and_write"
     runs: Annotated[
-        list[str], argument("RUN...", "Runs to fit on.", reads=True, known=options.SHIPPED_RUNS)
+        list[str],
+        argument(
+            "RUN...",
+            "Runs to fit on.",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+            needed="no run is given; name the runs to diagnose before --held-out",
+        ),
     ] = []
     held_out: Annotated[
         list[str],

@@ -193,14 +193,9 @@ def _say_silent(world: World, terminal: Terminal) -> None:
 
 def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
     """Replay a run, write it with the column ``replayed``, and print how far the two are apart."""
-    if not settings.twin:
-        raise InputError("no twin is given; name a file or one of " + ", ".join(twin_names()))
-    if not settings.run:
-        raise InputError("no run is given; name the run to replay")
+    assert settings.twin and settings.run and settings.out
     if settings.after and settings.truth:
         raise InputError("--after takes recorded runs, and --truth the truth of one; give one of the two")
-    if not settings.out:
-        raise InputError("no --out is given; name the file to write, .csv or .parquet")
     out = Path(settings.out)
     for what, given in (("the run itself", settings.run), ("the truth", settings.truth)):
         if given and out.exists() and Path(given).exists() and out.samefile(given):

@@ -1,44 +1,24 @@
 """Bases and memory over a course: bumps, relays, loops, lags, rates, decays, and its corners.
 
-The sine of many angles at once.
-
-NumPy's sine of double numbers goes one by one. Here angles come in turns, so that whole ones are cut off
-without rounding, and the series has no branch: a processor works on several at a time.
+Compiled loops are loaded by what needs them: effects that are listed compute nothing.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fogml.arrays import BoolArray, FloatArray
-from fogml.signals.compiled import kernel
-from fogml.signals.recursions import lag_kernel, play_kernel
-
-_SERIES = tuple((-1.0) ** k * (2.0 * math.pi) ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(11))
-_C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8, _C9, _C10 = _SERIES
-"""Taylor's series about 0 in turns: the term after the last is below 1e-16 at a quarter turn."""
 
 
 def sine(turns: ArrayLike) -> FloatArray:
     """sin(2 pi turns) to 5e-16, shape as given; NaN where an angle is not finite."""
+    from fogml.signals.sine_kernel import sine_kernel
+
     given = np.ascontiguousarray(turns, dtype=np.float64)
     out = np.empty_like(given)
-    _sine_kernel(given.reshape(-1), out.reshape(-1))
+    sine_kernel(given.reshape(-1), out.reshape(-1))
     return out
-
-
-@kernel()
-def _sine_kernel(turns: FloatArray, out: FloatArray) -> None:
-    for i in range(len(turns)):
-        x = turns[i] - np.floor(turns[i] + 0.5)
-        # The second and third quarter turn mirror the first and last.
-        x = math.copysign(0.5, x) - x if abs(x) > 0.25 else x
-        y = x * x
-        tail = _C5 + y * (_C6 + y * (_C7 + y * (_C8 + y * (_C9 + y * _C10))))
-        out[i] = x * (_C0 + y * (_C1 + y * (_C2 + y * (_C3 + y * (_C4 + y * tail)))))
 
 
 def bumps(x: FloatArray, low: float, high: float, count: int) -> FloatArray:
@@ -85,6 +65,8 @@ def preisach(
 
 def play(x: FloatArray, half_width: float) -> FloatArray:
     """What a play of a half width makes of a course, from its first value on, shape (n,)."""
+    from fogml.signals.recursions import play_kernel
+
     return np.asarray(play_kernel(np.ascontiguousarray(x), half_width, np.nan)[0])
 
 
@@ -92,6 +74,8 @@ def lag(time: FloatArray, x: FloatArray, time_constant_s: float) -> FloatArray:
     """First-order lag from rest, shape (n,)."""
     if time_constant_s <= 0.0:
         return x
+    from fogml.signals.recursions import lag_kernel
+
     return np.asarray(lag_kernel(time, x, np.array([time_constant_s]), np.nan, np.nan, np.nan)[0])
 
 

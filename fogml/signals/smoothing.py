@@ -23,8 +23,6 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.linalg import solveh_banded
 
 from fogml.arrays import FloatArray
 from fogml.signals.clock import Clock, gap_starts
@@ -83,6 +81,8 @@ def smoothed(values: FloatArray, share: float = 1.0) -> tuple[FloatArray, Smooth
 
 
 def _solved(bands: FloatArray, penalty: float, values: FloatArray) -> FloatArray:
+    from scipy.linalg import solveh_banded
+
     system = penalty * bands
     system[-1] += 1.0
     return np.asarray(solveh_banded(system, values, check_finite=False))
@@ -105,6 +105,8 @@ def window_difference(
     Values are a cubic spline between samples, and what they first were before. Samples that stand for the
     interval that ends at them hold what was half of it `ahead_s`.
     """
+    from scipy.interpolate import CubicSpline
+
     total = CubicSpline(time, values).antiderivative()
 
     def integral(at: FloatArray) -> FloatArray:
@@ -126,6 +128,8 @@ def at_points(
     """
     if not means or (spread == 0.0 and np.array_equal(time, at)):
         return {name: values.copy() for name, values in means.items()}
+    from scipy.interpolate import CubicSpline
+
     # One spline of all: building one costs far more than a column more.
     course = CubicSpline(time, np.column_stack(list(means.values())))
     return dict(zip(means, np.ascontiguousarray((course(at) - 0.5 * spread * course(at, 2)).T)))

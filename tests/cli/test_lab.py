@@ -189,7 +189,7 @@ def test_three_positions_tell_no_drift_and_say_so(invoke_json) -> None:
         (("north", "--azimuth", 10, "--latitude", 10, "--dwell", -1), "dwell -1"),
         (("north", "--azimuth", 10, "--latitude", 10, "--way", "fast"), "way 'fast'"),
         (("north", "--azimuth", 10, "--latitude", 10, "--noise", -1), "noise -1"),
-        (("north", "--positions", "p.csv", "--azimuth", 1), "give one of them"),
+        (("north", "--positions", ".", "--azimuth", 1), "give one of them"),
     ],
 )
 def test_bad_usage_is_one_message(invoke, tmp_path: Path, monkeypatch, arguments, message: str) -> None:

@@ -242,7 +242,7 @@ def test_errors_are_one_message_and_status_2(monkeypatch, error, message):
         raise error
 
     use_command(monkeypatch, action)
-    result = runner.invoke(main.app, ["train"])
+    result = runner.invoke(main.app, ["simulate"])
     assert result.exit_code == 2
     assert result.stdout == ""
     assert message in result.stderr
@@ -255,7 +255,7 @@ def test_an_interrupt_is_status_130(monkeypatch):
         raise KeyboardInterrupt
 
     use_command(monkeypatch, action)
-    assert runner.invoke(main.app, ["train"]).exit_code == 130
+    assert runner.invoke(main.app, ["simulate"]).exit_code == 130
 
 
 @pytest.mark.parametrize(
@@ -272,7 +272,7 @@ def test_what_nobody_expected_is_one_line_a_report_and_status_3(monkeypatch, tmp
         raise error
 
     use_command(monkeypatch, action)
-    result = runner.invoke(main.app, ["train", "--out", str(tmp_path / "out")])
+    result = runner.invoke(main.app, ["simulate", "--out", str(tmp_path / "out")])
     assert result.exit_code == 3
     assert result.stdout == ""
     (line,) = result.stderr.splitlines()
@@ -280,7 +280,7 @@ def test_what_nobody_expected_is_one_line_a_report_and_status_3(monkeypatch, tmp
     (report,) = tmp_path.iterdir()
     assert f"report written to {report};" in line
     text = report.read_text()
-    assert "Traceback" in text and fogml.__version__ in text and "command: fogml train --out" in text
+    assert "Traceback" in text and fogml.__version__ in text and "command: fogml simulate --out" in text
 
 
 def test_a_report_that_finds_no_room_beside_the_output_goes_to_the_temporary_files(monkeypatch, tmp_path):
@@ -289,7 +289,7 @@ def test_a_report_that_finds_no_room_beside_the_output_goes_to_the_temporary_fil
 
     use_command(monkeypatch, action)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    result = runner.invoke(main.app, ["train", "--out=missing/folder/out"])
+    result = runner.invoke(main.app, ["simulate", "--out=missing/folder/out"])
     assert result.exit_code == 3
     assert [path.suffix for path in tmp_path.iterdir()] == [".txt"]
 
@@ -299,7 +299,7 @@ def test_termination_is_status_143(monkeypatch):
         raise Terminated(signal.SIGTERM)
 
     use_command(monkeypatch, action)
-    assert runner.invoke(main.app, ["train"]).exit_code == 143
+    assert runner.invoke(main.app, ["simulate"]).exit_code == 143
 
 
 SWALLOWED = """

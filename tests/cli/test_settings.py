@@ -98,8 +98,10 @@ def test_backslashes_of_what_is_nowhere_or_is_named_so_are_left(tmp_path, monkey
     (tmp_path / r"in\a.csv").touch()
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "a.csv").touch()
-    runs = [r"in\a.csv", r"no\a.csv", "a" * 5000]
+    runs = [r"in\a.csv", "a" * 5000]
     assert TrainSettings.gather(config(tmp_path, f"runs: {json.dumps(runs)}\n"), {}).runs == runs
+    with pytest.raises(InputError, match=r"^settings\.yaml: 'runs': no\\a\.csv: no such file$"):
+        TrainSettings.gather(config(tmp_path, r"runs: [in\a.csv, no\a.csv]"), {})
 
 
 def test_a_value_of_the_wrong_kind_names_its_key(tmp_path):
@@ -114,12 +116,15 @@ def test_runs_beside_the_file_are_found(tmp_path, monkeypatch):
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     monkeypatch.chdir(elsewhere)
-    settings = TrainSettings.gather(config(folder, "runs: [a.csv]\ntest: [none.csv]\n"), {})
+    Path("here.csv").touch()
+    settings = TrainSettings.gather(config(folder, "runs: [a.csv]\ntest: [here.csv]\n"), {})
     assert settings.runs == [str(folder / "a.csv")]
-    assert settings.test == ["none.csv"]
+    assert settings.test == ["here.csv"]
 
 
-def test_written_settings_read_back_the_same(tmp_path):
+def test_written_settings_read_back_the_same(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("b.csv").touch()
     settings = TrainSettings.gather(
         None, {"runs": ["shipped:cold-start-x"], "test": ["b.csv"], "limits": ["rms=0.1"], "seed": 3}
     ).in_full()

@@ -59,6 +59,27 @@ def test_what_is_not_there_is_told_before_anything_heavy_loads(tmp_path: Path) -
         ["train", "there.csv", "--test", "none.csv"],
         ["compare", "there.csv", "--test", "none.csv"],
         ["compensate", "none.csv", "--model", "none"],
+        ["compensate", "there.csv", "--model", "none", "--out", "out.csv"],
+        ["compensate", "there.csv", "--model", "there.csv"],
+        ["export", "none"],
+        ["export"],
+        ["monitor", "none"],
+        ["train", "there.csv"],
+        ["train", "there.csv", "--test", "there.csv", "--from-diagnosis", "none"],
+        ["lab", "misalignment", "none.csv"],
+        ["lab", "misalignment"],
+        ["lab", "north", "--positions", "none.csv"],
+        ["lab", "north"],
+        ["lab", "rate"],
+        ["lab", "acceptance", "there.csv", "--limits", "none.yaml"],
+        ["lab", "batch", "none"],
+        ["benchmark", "run", "none", "--method", "auto"],
+        ["benchmark", "run", "."],
+        ["blind", "make"],
+        ["blind", "merge", "there.csv"],
+        ["effects", "shupe_pur"],
+        ["simulate"],
+        ["diagnose"],
         ["noise", "none.csv"],
         ["diagnose", "there.csv", "--held-out", "none.csv"],
         ["lab", "rate", "none.csv"],
@@ -78,7 +99,21 @@ def test_what_is_not_there_is_told_before_anything_heavy_loads(tmp_path: Path) -
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path
     )
     messages = answer.stderr.strip().splitlines()
-    assert len(messages) == len(commands) and all(": no " in m or "no cases" in m for m in messages), messages
+    assert len(messages) == len(commands) and all(
+        ": no " in m or ": give " in m or "there is no" in m for m in messages
+    ), messages
+    assert answer.stdout.split() == []
+
+
+def test_effects_are_listed_without_what_computes_them() -> None:
+    code = (
+        "import sys\nfrom fogml.cli.main import app\n"
+        "for words in (['effects', '--quiet'], ['effects', 'thermal_hysteresis', '--quiet']):\n"
+        "    try:\n        app(words)\n"
+        "    except SystemExit as end:\n        assert not end.code\n"
+        f"print(*sorted({HEAVY | {'scipy', 'numba', 'jinja2'}!r} & set(sys.modules)))"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.split() == []
 
 
