@@ -66,7 +66,11 @@ def exchange_whole(content: Path, real: Path) -> bool:
     """Put a folder in another's place in one step, with what only the other holds; False if impossible."""
     carried = [entry for entry in real.iterdir() if not os.path.lexists(content / entry.name)]
     for entry in carried:
-        _carry_over(entry, content / entry.name)
+        target = content / entry.name
+        if is_folder(entry):
+            shutil.copytree(entry, target, symlinks=True, copy_function=_link)
+        else:
+            _link(entry, target)
     shutil.copymode(real, content)
     if not _exchange(content, real):
         for entry in carried:
@@ -81,13 +85,6 @@ def exchange_whole(content: Path, real: Path) -> bool:
         if not os.path.lexists(real / entry.name):
             os.rename(entry, real / entry.name)
     return True
-
-
-def _carry_over(entry: Path, target: Path) -> None:
-    if is_folder(entry):
-        shutil.copytree(entry, target, symlinks=True, copy_function=_link)
-    else:
-        _link(entry, target)
 
 
 def _link(source: str | Path, target: str | Path) -> None:

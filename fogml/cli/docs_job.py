@@ -116,7 +116,9 @@ def _html(text: str, name: str, names: Iterable[str], folder: Path) -> str:
             if child.type == "link_open":
                 child.attrSet("href", _address(str(child.attrGet("href")), name, set(names)))
             if child.type == "image":
-                child.attrSet("src", _data(folder / str(child.attrGet("src"))))
+                path = folder / str(child.attrGet("src"))
+                content: Any = base64.b64encode(path.read_bytes()).decode("ascii")
+                child.attrSet("src", f"data:{_MEDIA[path.suffix]};base64,{markup(content)}")
     return reader.renderer.render(tokens, reader.options, {})
 
 
@@ -133,11 +135,6 @@ def _address(address: str, name: str, names: set[str]) -> str:
     if (page and not page.endswith(".md")) or stem not in names:
         return address
     return f"#{_anchor(stem, heading)}"
-
-
-def _data(path: Path) -> str:
-    content: Any = base64.b64encode(path.read_bytes()).decode("ascii")
-    return f"data:{_MEDIA[path.suffix]};base64,{markup(content)}"
 
 
 def options_page() -> str:

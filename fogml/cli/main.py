@@ -177,7 +177,9 @@ class Program(Group):
         except BrokenPipeError:
             raise
         except OSError as error:
-            fail(_system_message(error))
+            place = f"{error.filename}: " if error.filename else ""
+            remedy = "; make room and run the command again" if error.errno in NO_ROOM else ""
+            fail(f"{place}{error.strerror or error}{remedy}")
         except UnicodeEncodeError as error:
             # Python takes any bytes for a name; the libraries that read and write files take text.
             name = re.search(r"\S*[\udc80-\udcff]\S*", str(error.object))
@@ -231,12 +233,6 @@ def _interrupted(interrupt: KeyboardInterrupt) -> int:
     told = "what is finished is kept, nothing is half written; run the same command again"
     _tell(f"fogml: interrupted: {told}")
     return getattr(interrupt, "status", INTERRUPTED)
-
-
-def _system_message(error: OSError) -> str:
-    place = f"{error.filename}: " if error.filename else ""
-    remedy = "; make room and run the command again" if error.errno in NO_ROOM else ""
-    return f"{place}{error.strerror or error}{remedy}"
 
 
 def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:

@@ -84,21 +84,16 @@ def noise_run(settings: LimitSettings, terminal: Terminal) -> Run | None:
     return run
 
 
-def _seen_before(train_runs: list[Run], test_runs: list[Run]) -> list[str]:
-    """A note for each test run that is a training run too."""
-    return [
+def fit_and_judge(
+    settings: TrainSettings, train_runs: list[Run], test_runs: list[Run], terminal: Terminal
+) -> tuple[DriftModel, Judgement]:
+    """The fitted model and its judgement."""
+    notes = [
         f"{test.name} is the training run {trained.name}: its figures say nothing of a run not trained on"
         for test in test_runs
         for trained in train_runs
         if len(test) == len(trained) and test.hash == trained.hash
     ]
-
-
-def fit_and_judge(
-    settings: TrainSettings, train_runs: list[Run], test_runs: list[Run], terminal: Terminal
-) -> tuple[DriftModel, Judgement]:
-    """The fitted model and its judgement."""
-    notes = _seen_before(train_runs, test_runs)
     noise = noise_run(settings, terminal)
     with terminal.work(f"fitting {settings.model}") as work:
         if settings.train_again:

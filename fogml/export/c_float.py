@@ -104,19 +104,14 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         },
         "atom_expressions": [_atom(i, plan, windows) for i in range(len(plan.atoms))],
         "rule": thermometer_rule(plan.thermometer, number, 2.0**RANGE_BITS) | {"note": ""},
-        "columns": column_expressions(plan),
+        "columns": [
+            " * ".join(
+                ([f"f[{step.column}]"] if step.column is not None else []) + [f"a[{i}]" for i in step.atoms]
+            )
+            for step in plan.steps
+        ],
         **own_context(plan, windows, number, real),
     }
-
-
-def column_expressions(plan: Plan) -> list[str]:
-    """Feature columns as products of earlier ones and of limited atoms."""
-    return [
-        " * ".join(
-            ([f"f[{step.column}]"] if step.column is not None else []) + [f"a[{i}]" for i in step.atoms]
-        )
-        for step in plan.steps
-    ]
 
 
 def _atom(i: int, plan: Plan, windows: Layout) -> str:

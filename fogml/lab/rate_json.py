@@ -121,7 +121,15 @@ def rate_json(
         "zero_answers": [asdict(one) for one in zero],
         "step_answers": [asdict(one) for one in steps],
         "gains": [asdict(one) for one in read.gains],
-        "ladder": _ladder(read),
+        "ladder": [
+            {
+                "run": run.name,
+                "rate_deg_h": plateaus.rate.tolist(),
+                "output_deg_h": plateaus.output.tolist(),
+                "se_deg_h": plateaus.error.tolist(),
+            }
+            for run, plateaus in read.ladders
+        ],
         "unit": None if twin is None else unit_facts(twin),
     }
     told = () if twin is None else twin.notes
@@ -232,18 +240,6 @@ def _count(runs: Sequence[Run]) -> float | None:
             step = float(np.median(np.diff(run.time)))
             return step / abs(run.facts.scale_factor.count_per_deg_h)
     return None
-
-
-def _ladder(read: _Read) -> list[dict[str, Any]]:
-    return [
-        {
-            "run": run.name,
-            "rate_deg_h": plateaus.rate.tolist(),
-            "output_deg_h": plateaus.output.tolist(),
-            "se_deg_h": plateaus.error.tolist(),
-        }
-        for run, plateaus in read.ladders
-    ]
 
 
 def unit_facts(twin: Twin) -> dict[str, Any]:

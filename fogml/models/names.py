@@ -147,16 +147,10 @@ def _rbf(kind: str, features: str | None, parameters: Mapping[str, Any]) -> Drif
 def _of_features(regressor: Any, kind: str, features: str, parameters: Mapping[str, Any]) -> DriftModel:
     """A model of features with a regressor of a class, once both are known to be allowed."""
     from fogml.models.feature_model import FeatureModel
-
-    return FeatureModel(_understood(features), _configured(regressor, kind, parameters), kind=kind)
-
-
-def _configured(regressor: Any, kind: str, parameters: Mapping[str, Any]) -> Any:
-    """A regressor of a class with these parameters, once they are known to be allowed."""
     from fogml.models.parameters import check_parameters
 
     check_parameters(regressor, parameters, kind)
-    return regressor(**parameters)
+    return FeatureModel(_understood(features), regressor(**parameters), kind=kind)
 
 
 def _understood(features: str) -> str:

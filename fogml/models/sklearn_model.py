@@ -78,7 +78,12 @@ class SklearnModel(FeatureModel):
         """An unfitted regressor for `width` columns."""
         kind, options = self.check_options()
         if kind.__name__ == "GaussianProcessRegressor" and options.get("kernel") is None:
-            options["kernel"] = _drift_kernel(width)
+            # Own width for each feature, a linear part and white noise, for standardised columns.
+            from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
+
+            smooth = ConstantKernel(1.0, (1e-4, 1e4)) * RBF([1.0] * width, (1e-1, 1e3))
+            linear = ConstantKernel(1.0, (1e-4, 1e4)) * DotProduct(1.0, "fixed")
+            options["kernel"] = smooth + linear + WhiteKernel(1e-2, (1e-8, 1e1))
         from sklearn.compose import TransformedTargetRegressor
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
@@ -180,12 +185,3 @@ def sklearn_regressor_class(name: str) -> type:
     if needed or inspect.isabstract(kind):
         raise InputError(f"model '{name}': does not stand alone (it needs {', '.join(needed)}); {example}")
     return kind
-
-
-def _drift_kernel(width: int) -> Any:
-    """Own width for each feature, a linear part and white noise, for standardised columns."""
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
-
-    smooth = ConstantKernel(1.0, (1e-4, 1e4)) * RBF([1.0] * width, (1e-1, 1e3))
-    linear = ConstantKernel(1.0, (1e-4, 1e4)) * DotProduct(1.0, "fixed")
-    return smooth + linear + WhiteKernel(1e-2, (1e-8, 1e1))

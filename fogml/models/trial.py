@@ -113,7 +113,11 @@ class Trial:
                 if not candidate.features:
                     predicted[held] = table.y[fitted].mean()
                     continue
-                predicted[held], parameters = self._predicted(candidate, fitted, held)
+                features = parse_features(candidate.features)
+                atoms = self._atoms[:, [self._column[atom.text] for atom in features.atoms]]
+                predicted[held], parameters = held_out_prediction(
+                    regressor_for(candidate, self.seed), features, atoms, self._table, fitted, held
+                )[:2]
             by_block = squares_by_block(table, predicted)
             squares.append(by_block[0])
             rows.append(by_block[1])
@@ -123,15 +127,6 @@ class Trial:
     def chosen(self, scores: Sequence[Score]) -> Score:
         """The score of the candidate that these runs speak for."""
         return choose(scores, rates_told=self.rates_told, both_directions=self.both_directions)
-
-    def _predicted(
-        self, candidate: Candidate, fitted: IndexArray, held: IndexArray
-    ) -> tuple[FloatArray, int]:
-        features = parse_features(candidate.features)
-        atoms = self._atoms[:, [self._column[atom.text] for atom in features.atoms]]
-        return held_out_prediction(
-            regressor_for(candidate, self.seed), features, atoms, self._table, fitted, held
-        )[:2]
 
 
 def held_out_prediction(

@@ -46,7 +46,7 @@ def blind_page(values: Mapping[str, Any]) -> str:
         by_form=by_form_table(judged["by_form"]) if judged["by_form"] else None,
         figures=_figures(rows, values),
         others=_others(methods, name) if len(methods) > 1 else None,
-        by_kind=_by_kind(values),
+        by_kind=Table("Kind | >Cases", ((kind_words(kind), str(n)) for kind, n in values["kinds"].items())),
         strata=_strata(rows),
         strata_plot=strata_plot([by_key[key] for key in _STRATA_DRAWN if key in by_key]),
         reliability=reliability_plot(judged["reliability"], by_key["calibration_error"]["value"]),
@@ -96,10 +96,6 @@ def _warnings(
     return found
 
 
-def _outcome(row: Mapping[str, Any]) -> str:
-    return {True: "✓ met", False: "✗ not met", None: ""}[row["met"]]
-
-
 def _figures(rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Table:
     caption = "n is what a figure rests on: cases, named effects, listed effects or intervals."
     if 0 < values["mix"] < values["cases"]:
@@ -114,7 +110,7 @@ def _figures(rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Ta
                 row["words"],
                 figure_text(row),
                 wanted_text(row),
-                _outcome(row),
+                {True: "✓ met", False: "✗ not met", None: ""}[row["met"]],
                 str(row["n"]),
                 str(row["cases"]),
                 row["prototype"],
@@ -168,10 +164,6 @@ def _part(row: Mapping[str, Any], part: Mapping[str, Any] | None) -> str:
     if part is None or part["value"] is None:
         return MISSING
     return f"{value_text(part['value'], row['format'])} ({part['n']})"
-
-
-def _by_kind(values: Mapping[str, Any]) -> Table:
-    return Table("Kind | >Cases", ((kind_words(kind), str(n)) for kind, n in values["kinds"].items()))
 
 
 def _left_out(parts: Sequence[Mapping[str, Any]]) -> Table:

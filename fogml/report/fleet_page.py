@@ -65,11 +65,15 @@ def _line(fleet: Mapping[str, Any]) -> dict[str, Any] | None:
     if line is None:
         return None
     causes = bool(named_causes(line))
+    # Units that stand apart, and why; those of one kind and cause together, sizes each alone.
+    together: dict[tuple[str, ...], list[str]] = defaultdict(list)
+    for one in line["apart"]:
+        together[one["kind"], one["effect"], one["why"]].append(one["unit"])
     return {
         "sentences": line_sentences(line),
         "figure": line_figure(line) if causes else None,
         "table": line_table(line) if causes else None,
-        "apart": apart_facts(line),
+        "apart": [(listed(units, 8), f"{effect}: {why}") for (_, effect, why), units in together.items()],
     }
 
 
@@ -292,11 +296,3 @@ def line_figure(line: Mapping[str, Any]) -> Drawing:
             "Common and large is what to change in production; rare and large is what to sort out."
         ),
     )
-
-
-def apart_facts(line: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Units that stand apart, and why; those of one kind and cause together, sizes each alone."""
-    together: dict[tuple[str, ...], list[str]] = defaultdict(list)
-    for one in line["apart"]:
-        together[one["kind"], one["effect"], one["why"]].append(one["unit"])
-    return [(listed(units, 8), f"{effect}: {why}") for (_, effect, why), units in together.items()]

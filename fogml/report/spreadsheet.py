@@ -64,7 +64,8 @@ def spreadsheet(judgement: Judgement, path: str | Path) -> None:
         _summary(writer, judgement)
         _figures(writer, judgement)
         if coefficients_of(judgement.model):
-            _coefficients(writer, judgement)
+            heads = ("term", "coefficient [deg/h per unit of the term]", "standard error")
+            writer.table_sheet("Coefficients", heads, coefficients_of(judgement.model), (22,))
         _findings(writer, judgement)
         for kind, runs in (("test", judgement.test), ("train", judgement.train)):
             for index, run in enumerate(runs, start=1):
@@ -213,11 +214,6 @@ def _figures(writer: Writer, judgement: Judgement) -> None:
         "bias relative to",
     ]
     writer.table_sheet("Figures", heads, rows, (26, 13)).freeze_panes(1, 1)
-
-
-def _coefficients(writer: Writer, judgement: Judgement) -> None:
-    heads = ("term", "coefficient [deg/h per unit of the term]", "standard error")
-    writer.table_sheet("Coefficients", heads, coefficients_of(judgement.model), (22,))
 
 
 def _findings(writer: Writer, judgement: Judgement) -> None:

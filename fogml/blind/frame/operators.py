@@ -218,12 +218,8 @@ def slab_lag(time: FloatArray, x: FloatArray, time_constant_s: float, modes: int
         rate = order**2 / time_constant_s
         weight = 2.0 * (-1.0) ** k / order
         # Each mode falls behind by what it has not yet taken up of each change.
-        found = found - weight * _exponential(time, x, rate)
+        step = float(time[1] - time[0])
+        ratio = rate * step
+        kept, mean = np.exp(-ratio), -np.expm1(-ratio) / ratio
+        found = found - weight * np.asarray(lfilter([mean], [1.0, -kept], np.diff(x, prepend=x[0])))
     return found
-
-
-def _exponential(time: FloatArray, x: FloatArray, rate: float) -> FloatArray:
-    step = float(time[1] - time[0])
-    ratio = rate * step
-    kept, mean = np.exp(-ratio), -np.expm1(-ratio) / ratio
-    return np.asarray(lfilter([mean], [1.0, -kept], np.diff(x, prepend=x[0])))

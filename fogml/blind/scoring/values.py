@@ -198,7 +198,7 @@ def _as_mix(marks: Sequence[Mark]) -> list[Mark]:
 
 def _method(marks: Sequence[Mark]) -> dict[str, Any]:
     return {
-        "code": _code_states(marks),
+        "code": sorted({m.code for m in marks if m.code or not m.failure}, key=lambda state: state or ""),
         "by_reality": by_reality(marks),
         "by_form": by_form(marks),
         "rows": rows(marks),
@@ -209,11 +209,6 @@ def _method(marks: Sequence[Mark]) -> dict[str, Any]:
         "worst": worst(marks),
         "failed": [{"case": m.truth.case, "reason": m.failure} for m in marks if m.failure],
     }
-
-
-def _code_states(marks: Sequence[Mark]) -> list[str | None]:
-    """Each state of the code that gave answers; None for answers that do not tell."""
-    return sorted({m.code for m in marks if m.code or not m.failure}, key=lambda state: state or "")
 
 
 def _bin(part: Bin) -> dict[str, Any]:
