@@ -74,16 +74,10 @@ class DriftMark:
         return self.after > self.nothing + self.floor
 
 
-def drift_marks(
+def _drift_marks(
     folder: TrackFolder, cases: Mapping[str, Mapping[str, Any]], entries: Sequence[str], settling_s: float
 ) -> dict[str, list[DriftMark]]:
-    """Every entry's marks, in the order of the cases, the first `settling_s` of held-out runs left out.
-
-    Raises
-    ------
-    InputError
-        If an entry lacks a case, or an answer is not one finite number a sample.
-    """
+    """Every entry's marks, in the order of the cases, the first `settling_s` of held-out runs left out."""
     found: dict[str, list[DriftMark]] = {name: [] for name in entries}
     for case, told in cases.items():
         train = [read_run(path) for path in case_files(folder.cases / case).fit]
@@ -173,14 +167,8 @@ FIGURES: dict[str, tuple[str, Callable[[Sequence[Mark]], Estimate]]] = {
 """Words and measure of each figure."""
 
 
-def diagnosis_marks(folder: TrackFolder, entries: Sequence[str], workers: int = 1) -> dict[str, list[Mark]]:
-    """Every entry's marks, in the order of the cases.
-
-    Raises
-    ------
-    InputError
-        If an entry lacks a case, or an answer breaks the schema of ``gap.json`` or is not finite.
-    """
+def _diagnosis_marks(folder: TrackFolder, entries: Sequence[str], workers: int = 1) -> dict[str, list[Mark]]:
+    """Every entry's marks, in the order of the cases; refused where an answer lacks or is not sound."""
     check_sums(folder.truth)
     truths = [read_truth(folder.truth / f"{name}.json") for name in folder.names()]
     for name in entries:
@@ -236,8 +224,8 @@ def score_round(directory: str | Path, entries: Sequence[str] = (), *, workers: 
     if not found:
         raise InputError(f"{home / 'entries'}: holds no answers; run a method first: fogml benchmark run")
     settling_s = told["design"]["settling_s"]
-    drift = drift_marks(folders["drift"], told["tracks"]["drift"], chosen["drift"], settling_s)
-    named = diagnosis_marks(folders["diagnosis"], chosen["diagnosis"], workers)
+    drift = _drift_marks(folders["drift"], told["tracks"]["drift"], chosen["drift"], settling_s)
+    named = _diagnosis_marks(folders["diagnosis"], chosen["diagnosis"], workers)
     return {
         "schema": SCHEMA,
         "version": fogml.__version__,

@@ -38,20 +38,8 @@ _MOST_UNITS = 300
 _DIGITS = 6
 
 
-def make_case(folder: Path, truth_folder: Path, plan: Plan, seed: int, sample_s: float) -> None:
-    """Draw one case and write it: its runs and options into `folder`, its truth beside the others'.
-
-    Parameters
-    ----------
-    folder
-        The folder ``cases``.
-    truth_folder
-        The folder ``truth``.
-    plan
-        What it is to be.
-    seed, sample_s
-        As for `fogml.blind.make.make_cases`.
-    """
+def _make_case(folder: Path, truth_folder: Path, plan: Plan, seed: int, sample_s: float) -> None:
+    """Draw one case and write it: runs and options into `folder`, its truth beside the others'."""
     unit, effects = draw_case(plan, seed, sample_s)
     scales = Scales(unit)
     reckoning = Reckoning(scales, effects)
@@ -255,7 +243,7 @@ def _make(cases: Path, truth: Path, seed: int, sample_s: float, plan: Plan) -> N
     from fogml.blind.same_twin import make_same_twin
 
     with one_thread():
-        make = make_same_twin if plan.reality == SAME_TWIN else make_case
+        make = make_same_twin if plan.reality == SAME_TWIN else _make_case
         make(cases, truth, plan, seed, sample_s)
 
 

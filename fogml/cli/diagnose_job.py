@@ -24,7 +24,7 @@ from fogml.runs.run import Run
 from fogml.twin.twin_file import load_twin
 
 
-def diagnose_several(
+def _diagnose_several(
     settings: DiagnoseSettings,
     model: TwinModel,
     runs: Sequence[Run],
@@ -116,7 +116,7 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
             model, runs, held_out = column.model, column.fit, column.held_out
         if len({run.facts.unit for run in runs if run.facts.unit}) > 1:
             with terminal.work("diagnosing") as work:
-                several = diagnose_several(settings, model, runs, held_out, noise, work.doing)
+                several = _diagnose_several(settings, model, runs, held_out, noise, work.doing)
                 work.doing("writing")
                 write_several(folder, several, model, write_gap)
                 settings.write_into(folder, "diagnose")

@@ -55,23 +55,8 @@ def page_names(folder: Path | None = None) -> list[str]:
     return [Path(_FIRST).stem, *(line for line in lines if line and not line.startswith(":"))]
 
 
-def page_text(folder: Path, name: str, made: Mapping[str, str] | None = None) -> str:
-    """A page's Markdown, as any reader of CommonMark shows it.
-
-    Parameters
-    ----------
-    folder
-        Where the pages lie.
-    name
-        Stem of the page.
-    made
-        By stem, what a page ends with that is made rather than written.
-
-    Raises
-    ------
-    InputError
-        If there is no such page; names those there are.
-    """
+def _page_text(folder: Path, name: str, made: Mapping[str, str] | None = None) -> str:
+    """A page's Markdown, as any reader of CommonMark shows it, with what is made for its end, by stem."""
     names = page_names(folder)
     if name not in names:
         raise InputError(f"no page '{name}'; {known_are(name, names, 'pages')}")
@@ -97,7 +82,7 @@ def manual_page(folder: Path, made: Mapping[str, str] | None = None) -> str:
     from fogml.report.page import render
 
     names = page_names(folder)
-    texts = {name: page_text(folder, name, made) for name in names}
+    texts = {name: _page_text(folder, name, made) for name in names}
     sections = [(name, Markup(_html(text, name, names, folder))) for name, text in texts.items()]
     return render("manual.html", title=f"fogml {fogml.__version__}: the manual", sections=sections)
 
@@ -185,11 +170,11 @@ def show_docs(settings: DocsSettings, terminal: Terminal) -> None:
     if settings.out is not None and Path(settings.out).suffix not in (".html", ".htm"):
         raise InputError(f"{settings.out}: one HTML file is written; name it, e.g. fogml.html")
     pages = [
-        {"page": name, "title": title_of(page_text(folder, name)), "file": str(folder / f"{name}.md")}
+        {"page": name, "title": title_of(_page_text(folder, name)), "file": str(folder / f"{name}.md")}
         for name in page_names(folder)
     ]
     if settings.page is not None:
-        terminal.markdown(page_text(folder, settings.page, {"options": options_page()}))
+        terminal.markdown(_page_text(folder, settings.page, {"options": options_page()}))
         pages = [page for page in pages if page["page"] == settings.page]
     elif settings.out is None:
         terminal.table("", ["page", "about"], [[page["page"], page["title"]] for page in pages])

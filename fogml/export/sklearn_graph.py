@@ -40,7 +40,7 @@ def export_graph(model: DriftModel, folder: Path, dtype: str, settings: ExportSe
     features = model.features_
     runs = ", ".join(run.name for run in model.card_.runs)
     told = f"{model.kind} of {features.text}, trained on {runs}"
-    data = sklearn_onnx(model, dtype, told).SerializeToString()
+    data = _sklearn_onnx(model, dtype, told).SerializeToString()
     # The features without the regressor, for their points.
     zero = Compact(model.kind, affine(np.zeros(len(features)), 0.0))
     plan = Plan.with_features(zero, features, model.card_.sample_s)
@@ -69,14 +69,8 @@ def sklearn_difference(model: SklearnModel, plan: Plan, data: bytes, dtype: str,
     return value_difference(plan, off, seed)
 
 
-def sklearn_onnx(model: SklearnModel, dtype: str, card: str) -> onnx.ModelProto:
-    """The graph of a scikit-learn regressor, by skl2onnx: ``features`` (n, k) to ``drift`` (n) [deg/h].
-
-    Raises
-    ------
-    InputError
-        If skl2onnx is not installed, or can't convert it.
-    """
+def _sklearn_onnx(model: SklearnModel, dtype: str, card: str) -> onnx.ModelProto:
+    """The graph of a scikit-learn regressor, by skl2onnx: ``features`` (n, k) to ``drift`` (n) [deg/h]."""
     try:
         from onnx import TensorProto, helper, numpy_helper
         from skl2onnx import convert_sklearn

@@ -150,23 +150,8 @@ def pauses_are_real(time: FloatArray, ends: IndexArray, columns: Mapping[str, Fl
     return best > DECISIVE_SIGMA
 
 
-def even_clock(time: FloatArray, anchors: IndexArray, least_gap_s: float = 0.0) -> EvenClock | None:
-    """Even sampling through the times of some samples.
-
-    Parameters
-    ----------
-    time
-        Recorded times [s], shape (n,).
-    anchors
-        Samples whose times tell: the last of each burst, or the first that shows a new second.
-    least_gap_s
-        An excess over even sampling up to this [s] is no gap.
-
-    Returns
-    -------
-    EvenClock or None
-        None where the times don't fit even sampling between gaps.
-    """
+def _even_clock(time: FloatArray, anchors: IndexArray, least_gap_s: float = 0.0) -> EvenClock | None:
+    """Even sampling through the times of samples that tell them; None where they don't fit it."""
     told = time[anchors]
     periods, sizes = np.diff(told), np.diff(anchors)
     if len(periods) < 2:
@@ -235,7 +220,7 @@ def sampling_times(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, Findi
     ends = burst_ends(time)
     if ends is None:
         return time, None
-    clock = None if pauses_are_real(time, ends, columns) else even_clock(time, ends)
+    clock = None if pauses_are_real(time, ends, columns) else _even_clock(time, ends)
     if clock is None:
         return time, None
     size = float(np.median(np.diff(ends)))
@@ -254,7 +239,7 @@ def spread_stamps(time: FloatArray) -> tuple[FloatArray, str]:
     first = np.concatenate([[0], np.flatnonzero(time[1:] != time[:-1]) + 1])
     steps = np.diff(time[first])
     step = float(steps.min()) if len(steps) else 1.0
-    clock = even_clock(time, first, least_gap_s=2.0 * step) if len(first) >= LEAST_BURSTS else None
+    clock = _even_clock(time, first, least_gap_s=2.0 * step) if len(first) >= LEAST_BURSTS else None
     if clock is not None and clock.error_s <= 1.5 * step:
         return clock.time, clock.words()
     sizes = np.diff(np.append(first, len(time)))

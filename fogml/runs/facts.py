@@ -146,21 +146,15 @@ class Facts(Strict):
         """
         if self.started is None or self.in_use_since is None:
             return 0.0
-        return seconds_between(self.in_use_since, self.started, "in_use_since")
+        return _seconds_between(self.in_use_since, self.started, "in_use_since")
 
     def as_dict(self) -> dict[str, Any]:
         """The stated facts as YAML- and JSON-ready values."""
         return self.model_dump(mode="json", exclude_none=True)
 
 
-def seconds_between(earlier: datetime, later: datetime, what: str) -> float:
-    """Time from one moment to another [s].
-
-    Raises
-    ------
-    InputError
-        If only one of them has a time zone, or the later one is the earlier.
-    """
+def _seconds_between(earlier: datetime, later: datetime, what: str) -> float:
+    """Time from one moment to another [s], refused where it is none."""
     try:
         found = (later - earlier).total_seconds()
     except TypeError:

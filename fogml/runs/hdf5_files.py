@@ -46,14 +46,8 @@ from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 
 
-def h5py_module() -> Any:
-    """The h5py package.
-
-    Raises
-    ------
-    InputError
-        If it is not installed.
-    """
+def _h5py_module() -> Any:
+    """The h5py package, an extra."""
     try:
         import h5py
     except ImportError:
@@ -73,7 +67,7 @@ def hdf5_blocks(
 
     Only time, gyro and `columns` are read where these are given.
     """
-    h5py_module()
+    _h5py_module()
     with stored_file(path, "hdf5", (FACTS_KEY, *Facts.model_fields), limits) as stored:
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'")
@@ -98,7 +92,7 @@ def write_hdf5(run: Run, cells: dict[str, str], path: Path) -> None:
         If a column's name can't be a dataset's.
     """
     # Headers of HDF5 1.8 and later carry checksums, as the chunks of samples do.
-    with h5py_module().File(path, "w", libver=("v108", "v108"), track_order=True) as file:
+    with _h5py_module().File(path, "w", libver=("v108", "v108"), track_order=True) as file:
         for name, cell in cells.items():
             label, unit = parse_header(cell)
             if "/" in label or "\0" in label or label in ("", ".", "run"):
@@ -196,7 +190,7 @@ def write_mat(
         vectors: dict[str, Any] = {label: run.columns[name][:, None] for name, (label, _) in labels.items()}
         savemat(path, {**vectors, "units": units, "facts": facts}, long_field_names=True, do_compression=True)
         return
-    with h5py_module().File(path, "w", userblock_size=_USER_BLOCK, track_order=True) as file:
+    with _h5py_module().File(path, "w", userblock_size=_USER_BLOCK, track_order=True) as file:
         for name, (label, _) in labels.items():
             dataset = file.create_dataset(label, data=run.columns[name][None, :], compression="gzip")
             dataset.attrs["MATLAB_class"] = np.bytes_("double")

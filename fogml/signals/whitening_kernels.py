@@ -20,7 +20,7 @@ _TILE = 128
 
 
 @kernel()
-def step_terms(
+def _step_terms(
     step: float,
     averaging: float,
     time_constants: FloatArray,
@@ -34,21 +34,11 @@ def step_terms(
     process: FloatArray,
     cross: FloatArray,
 ) -> float:
-    """Constants of one step [s]; the variance of the sample that the states before do not explain.
+    """Variance of the sample that the states before do not explain.
 
-    Parameters
-    ----------
-    step, averaging
-        Since the sample before, and what the sample is a mean over [s]. A shorter step bounds the mean.
-    time_constants, variance
-        Of the Gauss-Markov states, shape (m,) [s] and one variance for all.
-    white, walk, rounding
-        Densities of white noise and random walk; variance of one rounding over the averaging time.
-    adjoining
-        Whether the angle was read at the sample before where this mean begins.
-    decay, reading, process, cross
-        Overwritten, shape (m + 2,): f, c, the states' noise variances and their covariances
-        with the sample's noise.
+    Fills decay, reading, the states' noise variances and their covariances with the sample's noise, shape
+    (m + 2,) each. A step [s] shorter than what samples are means over bounds the mean; `adjoining` says that
+    the angle was read where this mean begins.
     """
     m = len(time_constants)
     a = min(step, averaging)
@@ -104,7 +94,7 @@ def gains_kernel(
     steps, averaging
         Those pairs [s], shape (u,).
     time_constants, variance, white, walk
-        As in `step_terms`.
+        As in `_step_terms`.
     quantum
         Rounding of the angle times 3600 s/h: its share in a sample is over the averaging time.
     adjoining
@@ -131,7 +121,7 @@ def gains_kernel(
         if kind[i] != now:
             now = kind[i]
             step, a = steps[now], averaging[now]
-            own = step_terms(
+            own = _step_terms(
                 step, a, time_constants, variance, white, walk,
                 (quantum / a) ** 2, step <= adjoining * a, f, c, process, cross,
             )  # fmt: skip

@@ -28,23 +28,13 @@ from fogml.runs.run import Run
 from fogml.tuning.plan import Choice, Space
 
 
-def held_out_predictions(
+def _held_out_predictions(
     made: Weighed, table: TrainingTable, atoms: FloatArray, folds: Sequence[Fold]
 ) -> Iterator[FloatArray]:
-    """Drift on the rows that each fold holds out [deg/h], of its members fitted anew without these rows.
+    """Drift on the rows that each fold holds out [deg/h], of the members fitted anew without these rows.
 
-    The members' weights and the sizes of a mixed-effects model are those that all training runs tell.
-
-    Parameters
-    ----------
-    made
-        What `auto` made of the runs.
-    table
-        Rows of the same runs, without features.
-    atoms
-        The rows' values of the atoms of ``made.union``, shape (n, a).
-    folds
-        Indices of the table's rows.
+    `atoms` are the rows' values of the atoms of ``made.union``, shape (n, a). The members' weights and the
+    sizes of a mixed-effects model are those that all training runs tell.
     """
     weights = np.array(list(made.weights.values()))
     both = _joined(made.table, replace(table, X=atoms))
@@ -212,7 +202,7 @@ class HeldOut:
             assert isinstance(made.model, FeatureModel)
             regressor = made.model.regressor_
             cost = weight_bytes(regressor), self._operations(made.model.features_, regressor)
-            for predicted in held_out_predictions(made, self._table, atoms, self.folds):
+            for predicted in _held_out_predictions(made, self._table, atoms, self.folds):
                 yield predicted, *cost
             return
         features = parse_features(choice.features)

@@ -21,14 +21,8 @@ if TYPE_CHECKING:
 Split = tuple[list[Run], list[Run]]
 
 
-def splits_of(runs: Sequence[Run]) -> list[Split]:
-    """The others and the run left out, for each run.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two runs.
-    """
+def _splits_of(runs: Sequence[Run]) -> list[Split]:
+    """The others and the run left out, for each run."""
     if len(runs) < 2:
         raise InputError(f"leaving one run out needs at least two runs, {len(runs)} given")
     return [([*runs[:i], *runs[i + 1 :]], [run]) for i, run in enumerate(runs)]
@@ -112,7 +106,7 @@ def compare(
     if test_runs is not None:
         judgements = contest.judged(train_runs, test_runs, design_index, limits)
     else:
-        folds = [contest.judged(others, held_out) for others, held_out in splits_of(train_runs)]
+        folds = [contest.judged(others, held_out) for others, held_out in _splits_of(train_runs)]
         whole = contest.judged(train_runs, [])
         judgements = {}
         for name in whole:
