@@ -60,7 +60,7 @@ def write_several(
     write: Callable[[Path, Diagnosis], None],
 ) -> None:
     """``units.json``, its page, and for each unit a folder with what a diagnosis of it alone writes."""
-    from fogml.report.units_page import units_page
+    from fogml.report.axes_page import units_page
 
     names = folder_names(list(found.by_unit))
     values = finite_json(found.as_dict() | {"folders": dict(zip(found.by_unit, names))})

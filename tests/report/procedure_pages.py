@@ -16,13 +16,12 @@ from fogml.benchmark.score import DriftMark, diagnosis_figures, drift_figures
 from fogml.blind.scoring.values import score_values
 from fogml.cli.docs_job import manual_folder, manual_page, options_page
 from fogml.pictures import Curve, line_figure
-from fogml.report.axes_page import axes_page
+from fogml.report.axes_page import axes_page, units_page
 from fogml.report.benchmark_page import benchmark_page
 from fogml.report.blind_page import blind_page
 from fogml.report.effect_card import catalogue_page, effect_page
 from fogml.report.plan_page import plan_page
 from fogml.report.sweep_page import sweep_page
-from fogml.report.units_page import units_page
 from fogml.runs.run import Run
 from fogml.twin.pictures import allan_curve, card_values, pictures, rate_curves
 from fogml.twin.registry import effects
