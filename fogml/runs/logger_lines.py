@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.arrow_arrays import values_of
-from fogml.errors import InputError
+from fogml.errors import InputError, counted, quoted
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.raw_table import empty_file
+from fogml.runs.stamps import stamp_form
 
 PART_BYTES = 1 << 23
 """Bytes of a text that are looked into at once; a part takes some ten times as much memory."""
@@ -147,6 +148,34 @@ def hide_quoted(content: bytes, separator: str | None) -> bytes:
         return content
     mark = separator.encode()
     return _QUOTED.sub(lambda found: found[0].replace(mark, HIDDEN.encode()), content)
+
+
+class FaultyFields(InputError):
+    """Rows of a column hold no number or no date.
+
+    Attributes
+    ----------
+    column
+        The column's source.
+    filled, rows
+        How many rows hold one, of how many.
+    """
+
+    def __init__(self, place: str, column: str, what: str, count: int, rows: int, hint: str) -> None:
+        super().__init__(
+            f"{place}, column {quoted(column)}: {what} ({counted(count, 'such row')}); correct it, or leave "
+            f"such rows out by 'reject: {{not_numbers: true}}' in the profile; {hint}"
+        )
+        self.column, self.filled, self.rows = column, rows - count, rows
+
+
+def cell_words(cell: str, first: str, is_time: bool) -> str:
+    """What is wrong with a field's text; of dates with that of the first row, else an empty one."""
+    if first:
+        return f"{quoted(cell)} is no date and time as in the first row, {quoted(first)}"
+    if is_time and stamp_form([cell]) is not None:
+        return f"{quoted(cell)} is a date or time of day, which 'unit: stamp' reads"
+    return f"{quoted(cell)} is no number" if cell else "empty, a number was expected"
 
 
 def shown(text: str, separator: str | None) -> str:

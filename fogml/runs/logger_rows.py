@@ -15,6 +15,7 @@ from fogml.readers import plain_path
 from fogml.runs.columns import conversion, is_temperature
 from fogml.runs.container_files import container_columns
 from fogml.runs.findings import Finding
+from fogml.runs.logger_lines import FaultyFields
 from fogml.runs.logger_text import LoggerTable, read_logger_text
 from fogml.runs.opening import Opened, opened
 from fogml.runs.other_rate import interpolated
@@ -37,17 +38,18 @@ def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
     file = opened(path) if path.is_file() and path.stat().st_size else Opened("csv", path)
     kind = file.kind
     if kind == "csv":
-        table = read_logger_text(file.path, layout, name)
+        try:
+            table = read_logger_text(file.path, layout, name)
+        except FaultyFields as faulty:
+            if file.within and faulty.filled < min(faulty.rows, 2):
+                file.within.check_values(f", column '{faulty.column}'")
+            raise
         return replace(table, findings=(*table.findings, *(file.within.findings if file.within else ())))
     if layout.text_sources:
         raise InputError(f"{path.name}: texts and stamps are read from text files; name columns of numbers")
-    columns, findings = container_columns(path, kind, layout.sources, _clock(layout))
+    columns, findings = container_columns(path, kind, layout.sources, layout.clock)
     count = len(next(iter(columns.values())))
     return LoggerTable(columns, np.arange(count), count, findings)
-
-
-def _clock(layout: TextLayout) -> str | int | None:
-    return layout.columns["time"].number if "time" in layout.columns else None
 
 
 def internal(values: FloatArray, name: str, column: ImportColumn) -> FloatArray:
@@ -145,7 +147,7 @@ def _seconds(table: LoggerTable, profile: ImportProfile) -> FloatArray:
     """Time of each row since the first [s]."""
     if table.seconds is not None:
         return table.seconds - table.seconds[:1]
-    clock = _clock(profile)
+    clock = profile.clock
     if clock is None:
         assert profile.sample_s is not None
         return np.asarray(table.rows * profile.sample_s)

@@ -17,7 +17,9 @@ from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
 from fogml.runs.logger_lines import (
     PART_BYTES,
+    FaultyFields,
     Lines,
+    cell_words,
     field_numbers,
     field_texts,
     hide_quoted,
@@ -256,12 +258,20 @@ class _Reader:
             faulty[-1] = True
         if faulty.any():
             line = int(numbers[rows[np.argmax(faulty)]])
-            place = f"line {self.lines_before + line + 1}"
             if not self.profile.reject.not_numbers or 2 * np.count_nonzero(faulty) > len(rows):
-                raise InputError(
-                    f"{self.file}: {place} holds text or nothing in a number's place "
-                    f"({int(faulty.sum())} such rows): {quoted(self._line(lines, line))}; {self.hint}"
-                )
+                wrong = {s: ~np.isfinite(v) for s, v, used in zip(sources, values, self.filled) if used}
+                if seconds is not None:
+                    wrong = dict.fromkeys(self.profile.stamps, np.isnan(seconds)) | wrong
+                row = int(np.argmax(faulty))
+                source = next((source for source, bad in wrong.items() if bad[row]), next(iter(places)))
+                count = int(np.count_nonzero(wrong[source]))
+                separator, first = self.profile.text_separator, ""
+                cell = shown(lines.line(line).split(separator)[places[source]], separator).strip()
+                if source in texts:
+                    cell, first = (" ".join(texts[s][i] for s in self.profile.stamps) for i in (row, 0))
+                place = f"{self.file}, line {self.lines_before + line + 1}"
+                told = cell_words(cell, first, source == self.profile.clock)
+                raise FaultyFields(place, str(source), told, count, len(rows), self.hint)
             bad = np.zeros(len(numbers), dtype=bool)
             bad[rows[faulty]] = True
             self._reject("with text or nothing in a number's place", bad)
@@ -290,15 +300,16 @@ class _Reader:
         if self.clock is None:
             stamps = stamps_of([(i, column[:1000].tolist()) for i, column in enumerate(columns)])
             if stamps is None:
+                first = " ".join(str(text) for column in columns for text in column[:1])
                 raise InputError(
-                    f"{self.file}: {quoted(str(columns[0][:1].tolist()))} is no date or time of day; "
-                    f"{self.hint}"
+                    f"{self.file}, column {quoted(str(places[0]))}: {quoted(first)} in the first row is no "
+                    f"date or time of day; {self.hint}"
                 )
             self.clock = StampClock(stamps, self.file)
         return self.clock.seconds([pa.array(column, pa.string()) for column in columns])
 
     def _filled(self, places: dict[str | int, int], values: FloatArray) -> BoolArray:
         """Which sources have a value in every row: those of another rate are empty in most, evenly so."""
-        clock = self.profile.columns["time"].number if "time" in self.profile.columns else None
+        clock = self.profile.clock
         kinds = zip(places, values, strict=True)
         return np.array([source == clock or not is_of_another_rate(column) for source, column in kinds])

@@ -65,7 +65,7 @@ class HeldText:
             if kind == "packed":
                 _check_text(path, first)
             elif not has_rows(first):
-                self._check_values("")
+                self.check_values("")
             if array.name in stored.told.get("hidden", ()):
                 message = (
                     f"the hidden sheet {quoted(array.name)} is read, as no sheet that is shown holds a run"
@@ -101,9 +101,9 @@ class HeldText:
         """As `keeping`, of one column by its name and how many of its rows hold something."""
         is_known = column_spec(name) is not None or name.startswith("gyro_")
         if is_known and filled < min(rows, 2):
-            self._check_values(f", column '{name}'")
+            self.check_values(f", column '{name}'")
 
-    def _check_values(self, place: str) -> None:
+    def check_values(self, place: str) -> None:
         """Refuse a workbook of formulas without values."""
         path, kind, limits = self._of
         if kind != "workbook":

@@ -158,6 +158,11 @@ class TextLayout(Strict):
         return self.columns["time"].stamps if "time" in self.columns else ()
 
     @property
+    def clock(self) -> str | int | None:
+        """The source of the time where it is one of numbers."""
+        return self.columns["time"].number if "time" in self.columns else None
+
+    @property
     def text_separator(self) -> str | None:
         """The separating character; None for any run of blanks and tabs."""
         return SEPARATORS[self.separator]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 import zipfile
+from datetime import datetime, timedelta
 
 import numpy as np
+import openpyxl
 import pytest
 
 from fogml.errors import InputError
 from fogml.runs.profile_draft import draft_profile
+from fogml.runs.profiles import import_recording, load_profile
 from fogml.runs.reading import read_run
 from tests.cli.conftest import run_program
 
@@ -275,3 +278,68 @@ def test_another_temperature_than_the_coils_is_enough_to_inspect(tmp_path, name)
     path = tmp_path / "run.csv"
     path.write_text(text(f"time [s],gyro [deg/h],{name} [degC],note [1]"))
     run_program("inspect", path, "-o", tmp_path / "inspected", "--quiet")
+
+
+STAMPED = """schema: fogml.import/1
+description: by hand
+columns:
+  time: {source: Zeit, unit: stamp}
+  gyro: {source: Rate, unit: deg/h}
+"""
+
+
+@pytest.mark.parametrize(
+    ("unit", "place", "value", "told"),
+    [
+        (
+            "s",
+            "B",
+            "=A{row}*0.1+5",
+            "column 'Rate': empty, and the workbook holds formulas without values; open",
+        ),
+        ("s", "B", None, "line 2, column 'Rate': empty, a number was expected \\(9 such rows\\)"),
+        (
+            "s",
+            "B5",
+            "k. A.",
+            "line 5, column 'Rate': 'k\\. A\\.' is no number \\(1 such row\\); correct it, or leave",
+        ),
+        (
+            "s",
+            "A",
+            datetime(2026, 3, 1, 8),
+            "'2026-03-01 08:00:00' is a date or time of day, which 'unit: stamp'",
+        ),
+        (
+            "stamp",
+            "A5",
+            "Pause",
+            "line 5, column 'Zeit': 'Pause' is no date and time as in the first row, '2026-",
+        ),
+        (
+            "stamp",
+            "A7",
+            3600.0,
+            "line 7, column 'Zeit': '3600' is no date and time as in the first row, '2026-",
+        ),
+        ("stamp", "A2", "Start", "column 'Zeit': 'Start' in the first row is no date or time of day"),
+    ],
+)
+def test_what_a_profile_by_hand_meets_in_a_workbook_is_told_by_row_and_value(
+    tmp_path, unit, place, value, told
+):
+    """One cell, or a whole column."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(["Zeit", "Rate"])
+    for i in range(9):
+        moment = datetime(2026, 3, 1, 8) + timedelta(seconds=i)
+        sheet.append([float(i) if unit == "s" else moment, 5.0 + 0.01 * i])
+    for row in range(2, 11) if len(place) == 1 else [int(place[1:])]:
+        cell = sheet[f"{place[0]}{row}"]
+        cell.value = value.format(row=row) if isinstance(value, str) else value
+        cell.number_format = "General" if isinstance(value, float) else "yyyy-mm-dd hh:mm"
+    book.save(tmp_path / "book.xlsx")
+    (tmp_path / "own.yaml").write_text(STAMPED.replace("unit: stamp", f"unit: {unit}"))
+    with pytest.raises(InputError, match=rf"^book\.xlsx, .*{told}"):
+        import_recording(tmp_path / "book.xlsx", load_profile(str(tmp_path / "own.yaml")))
