@@ -28,7 +28,9 @@ from fogml.lab.misalignment_errors import (
     Slopes,
     StateFit,
     covariance_of,
+    cross_tilt_angle,
     errors_of,
+    reversed_words,
     slope_noise,
     weights_of,
 )
@@ -63,6 +65,8 @@ class TableMeasurements:
         Whether they come from a simulation.
     place
         When they were measured, in any unit that increases evenly; None where no one says.
+    left_out
+        Sentences on turns that were recorded and are not among them.
     """
 
     state: FloatArray
@@ -74,6 +78,7 @@ class TableMeasurements:
     state_angles_deg: Sequence[float] = DOCUMENT_ANGLES_DEG
     synthetic: bool = False
     place: FloatArray | None = None
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -179,7 +184,7 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
         covariance = covariance_of(gradient, fits, variances, drift)
         se, intervals, region = errors_of(values, covariance, dof)
     doubt = "" if drift is None else ", or the scale factor drifts unevenly"
-    across, more = _cross_tilt_angle(fits, values, covariance, doubt) if cross_tilt else (None, ())
+    across, more = cross_tilt_angle(fits, values, covariance, doubt) if cross_tilt else (None, ())
     return Misalignment(
         K=float(values[0]),
         delta_x_deg=float(values[1]),
@@ -198,7 +203,15 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
         order_p=order_p,
         scale_drift_ppm=None if drift is None else 1e6 * drift.share,
         scale_drift_se_ppm=None if drift is None else 1e6 * drift.se,
-        notes=(*doubts, *notes, *more, *drift_words(drift), *_reversed(values), sense_of(angles_deg)),
+        notes=(
+            *measured.left_out,
+            *doubts,
+            *notes,
+            *more,
+            *drift_words(drift),
+            *reversed_words(values),
+            sense_of(angles_deg),
+        ),
     )
 
 
@@ -210,6 +223,17 @@ def check_states(measured: TableMeasurements) -> None:
             f"{measured.source}: no turns in state {', '.join(missing)}; the four-state procedure needs "
             "states 1, 2, 3 and 4, the second and fourth turned by 180 deg in the mounting plane"
         )
+
+
+def determines(measured: TableMeasurements) -> bool:
+    """Whether all states are there, each with tilts that tell sine from cosine."""
+    try:
+        check_states(measured)
+        for state in STATES:
+            fit_state(measured, state)
+    except InputError:
+        return False
+    return True
 
 
 def fit_state(measured: TableMeasurements, state: int, cross_tilt: bool = False) -> StateFit:
@@ -303,28 +327,3 @@ def _shows_cross_tilt(slopes: Mapping[int, Slopes]) -> bool:
         return before > (ROUND_OFF * scale) ** 2 * dof
     ratio = (before - after) / len(wide) / (after / dof)
     return variances_sf(ratio, len(wide), dof) < _CROSS_TILT_TEST
-
-
-def _cross_tilt_angle(
-    fits: tuple[StateFit, ...], values: FloatArray, covariance: FloatArray | None, doubt: str = ""
-) -> tuple[float | None, tuple[str, ...]]:
-    """Size of the fixture's tilt across: the constants of opposite states differ by 2 K sin f a_x or a_y."""
-    note = (
-        f"a fixture tilted across by f shows{doubt}; K is low by the factor cos f, the misalignment is right"
-    )
-    constants = np.array([fit.coefficients[2] for fit in fits])
-    size = np.hypot(constants[0] - constants[1], constants[2] - constants[3]) / 2.0
-    lever = values[0] * np.sin(np.radians(values[3]))
-    told = covariance is None or values[3] > 5.0 * np.sqrt(covariance[3, 3])
-    if not told or size >= abs(lever):
-        return None, (note,)
-    return float(np.degrees(np.arcsin(size / lever))), (note,)
-
-
-def _reversed(values: FloatArray) -> tuple[str, ...]:
-    if values[3] <= 90.0:
-        return ()
-    return (
-        "the input axis points down, or the output's sign is reversed: the angle to the reference axis is "
-        "above 90 deg",
-    )

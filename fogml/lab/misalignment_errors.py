@@ -215,3 +215,29 @@ def _region(centre: FloatArray, covariance: FloatArray, dof: int) -> Region:
     long = axes[:, 1]
     angle = float(np.degrees(np.arctan2(long[1], long[0]))) % 180.0
     return Region(LEVEL, (float(half[1]), float(half[0])), angle, outline)
+
+
+def cross_tilt_angle(
+    fits: tuple[StateFit, ...], values: FloatArray, covariance: FloatArray | None, doubt: str = ""
+) -> tuple[float | None, tuple[str, ...]]:
+    """Size of the fixture's tilt across: the constants of opposite states differ by 2 K sin f a_x or a_y."""
+    note = (
+        f"a fixture tilted across by f shows{doubt}; K is low by the factor cos f, the misalignment is right"
+    )
+    constants = np.array([fit.coefficients[2] for fit in fits])
+    size = np.hypot(constants[0] - constants[1], constants[2] - constants[3]) / 2.0
+    lever = values[0] * np.sin(np.radians(values[3]))
+    told = covariance is None or values[3] > 5.0 * np.sqrt(covariance[3, 3])
+    if not told or size >= abs(lever):
+        return None, (note,)
+    return float(np.degrees(np.arcsin(size / lever))), (note,)
+
+
+def reversed_words(values: FloatArray) -> tuple[str, ...]:
+    """What is said of an input axis that points away from the reference axis."""
+    if values[3] <= 90.0:
+        return ()
+    return (
+        "the input axis points down, or the output's sign is reversed: the angle to the reference axis is "
+        "above 90 deg",
+    )

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
-from fogml.errors import InputError
-from fogml.lab.misalignment import TableMeasurements
+from fogml.errors import InputError, counted
+from fogml.lab.misalignment import TableMeasurements, determines
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG
-from fogml.numerals import short
+from fogml.numerals import listed, short
 from fogml.runs.raw_table import numbered_row
 from fogml.runs.run import Run
 from fogml.runs.transitions import MARGIN_BEYOND_S, time_to_rate_s, transition_mask
@@ -240,7 +240,11 @@ def _chunks(
 
 
 def _measured(rows: Rows, chunks: _Chunks) -> TableMeasurements:
-    """Each turn less the mean of the rests next to it."""
+    """Each turn less the mean of the rests next to it.
+
+    A turn that lost a rest is left out where the others determine all that is asked for; with it those of its
+    state and tilt that turn one way only without it, of which the part even in the rate would not cancel.
+    """
     turns = np.flatnonzero(~chunks.rest)
     if len(turns) == 0:
         raise InputError(
@@ -257,23 +261,50 @@ def _measured(rows: Rows, chunks: _Chunks) -> TableMeasurements:
 
     has_before, has_after = same(turns - 1), same(turns + 1)
     lonely = ~(has_before & has_after)
-    if lonely.any():
-        turn = turns[int(np.argmax(lonely))]
-        side = "before" if not has_before[int(np.argmax(lonely))] else "after"
-        raise InputError(
-            f"{rows.source}, {rows.row_name(int(chunks.place[turn]))}: no rest {side} the turn at "
-            f"{chunks.rate_deg_s[turn]:.6g} deg/s (state {chunks.state[turn]:g}, tilt "
-            f"{chunks.tilt_deg[turn]:g} deg); each turn needs a rest at the same state and "
-            "tilt before and after it"
-        )
-    level = (chunks.before_mean[turns - 1] + chunks.after_mean[turns + 1]) / 2.0
-    return TableMeasurements(
-        chunks.state[turns],
-        chunks.tilt_deg[turns],
-        chunks.rate_deg_s[turns],
-        chunks.mean[turns] - level,
+    missing = []
+    for i in np.flatnonzero(lonely):
+        side = "after" if has_before[i] else "before"
+        missing.append(f"no rest {side} the turn at {_turn_words(rows, chunks, int(turns[i]))}")
+    kept = turns[~(lonely | _one_way(chunks, turns, lonely))]
+    level = (chunks.before_mean[kept - 1] + chunks.after_mean[kept + 1]) / 2.0
+    found = TableMeasurements(
+        chunks.state[kept],
+        chunks.tilt_deg[kept],
+        chunks.rate_deg_s[kept],
+        chunks.mean[kept] - level,
         rows.unit,
         rows.source,
         rows.state_angles_deg,
-        place=chunks.place[turns] + 0.5 * chunks.count[turns],
+        place=chunks.place[kept] + 0.5 * chunks.count[kept],
     )
+    if not missing:
+        return found
+    if not determines(found):
+        raise InputError(
+            f"{rows.source}: {missing[0]}; each turn needs a rest at the same state and tilt before and after"
+            " it, and the other turns do not tell scale factor and misalignment"
+        )
+    others = len(turns) - len(kept) - len(missing)
+    told = f"{len(turns) - len(kept)} of {counted(len(turns), 'turn')}"
+    more = f"; with it {counted(others, 'turn')} of that state and tilt the other way" if others else ""
+    return replace(found, left_out=(f"{told} left out: {listed(missing)}{more}",))
+
+
+def _turn_words(rows: Rows, chunks: _Chunks, turn: int) -> str:
+    return (
+        f"{chunks.rate_deg_s[turn]:.6g} deg/s in {rows.row_name(int(chunks.place[turn]))} (state "
+        f"{chunks.state[turn]:g}, tilt {chunks.tilt_deg[turn]:g} deg)"
+    )
+
+
+def _one_way(chunks: _Chunks, turns: IndexArray, lost: BoolArray) -> BoolArray:
+    """Turns of a state and tilt that go both ways with the lost ones and one way only without, shape (t,)."""
+    setting = np.column_stack([chunks.state[turns], chunks.tilt_deg[turns]])
+    _, group = np.unique(setting, axis=0, return_inverse=True)
+    group, ways = group.ravel(), np.sign(chunks.rate_deg_s[turns])
+
+    def both(chosen: BoolArray) -> BoolArray:
+        there = [np.bincount(group[chosen & (ways == way)], minlength=len(turns)) > 0 for way in (-1.0, 1.0)]
+        return np.asarray((there[0] & there[1])[group])
+
+    return np.asarray(both(np.ones(len(turns), dtype=bool)) & ~both(~lost) & ~lost)

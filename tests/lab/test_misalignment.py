@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fogml.errors import InputError
-from fogml.lab.misalignment import TableMeasurements, _cross_tilt_angle, _slopes, decouple
+from fogml.lab.misalignment import TableMeasurements, _slopes, decouple
+from fogml.lab.misalignment_errors import cross_tilt_angle
 from fogml.lab.misalignment_json import compare_methods, relative_error_ppm
 from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
@@ -156,7 +157,7 @@ def test_a_tilt_across_is_told_beside_a_misalignment_that_is(error_deg: float | 
     fits: Any = [SimpleNamespace(coefficients=(0.0, 0.0, constant)) for constant in (half, -half, 0.1, 0.1)]
     covariance = None if error_deg is None else np.diag([0.0, 0.0, 0.0, error_deg**2])
     values = np.array([K, 0.0, misalignment_deg, misalignment_deg])
-    found, notes = _cross_tilt_angle(fits, values, covariance)
+    found, notes = cross_tilt_angle(fits, values, covariance)
     assert found == (pytest.approx(tilt_deg, rel=1e-9) if told else None)
     assert len(notes) == 1
 

@@ -155,10 +155,43 @@ def test_turns_of_the_states_given_and_faults(tmp_path: Path) -> None:
         read_measurements(own)
 
 
-def test_a_turn_without_a_rest_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("both_rates", "lost", "kept", "said"),
+    [
+        (
+            True,
+            slice(2, 4),
+            62,
+            "2 of 64 turns left out: no rest after the turn at 10 deg/s in line 3 (state 1, tilt 0 deg) and "
+            "no rest before the turn at -10 deg/s in line 4 (state 1, tilt 0 deg)",
+        ),
+        (
+            False,
+            slice(0, 1),
+            30,
+            "2 of 32 turns left out: no rest before the turn at 10 deg/s in line 2 (state 1, tilt 0 deg); "
+            "with it 1 turn of that state and tilt the other way",
+        ),
+    ],
+)
+def test_turns_without_a_rest_are_left_out_and_the_others_tell_the_same(
+    tmp_path: Path, both_rates: bool, lost: slice, kept: int, said: str
+) -> None:
+    """By the known answer; what is left of a tilt may turn one way only, and goes too."""
     rows = lines(rate_on_rests=False)
-    del rows[2:4]
-    with pytest.raises(InputError, match="no rest after the turn at 10 deg/s"):
+    if not both_rates:
+        rows = [row for i in range(0, len(rows), 3) for row in rows[i : i + 3] if i % 12 < 6]
+    del rows[lost]
+    found = decouple(turns := read_measurements(written(tmp_path, rows)))
+    assert len(turns.output) == kept and found.notes[0] == said
+    np.testing.assert_allclose(found.K, 1.2345, rtol=1e-9)
+    assert (found.delta_x_deg, found.delta_y_deg) == pytest.approx((5.0, 3.0), abs=1e-8)
+
+
+def test_a_lost_rest_is_named_where_the_others_do_not_determine_the_result(tmp_path: Path) -> None:
+    rows = [row for row in lines(rate_on_rests=False) if row.split(",")[1] in ("0", "90")]
+    del rows[2:4], rows[6:8]
+    with pytest.raises(InputError, match=r"no rest after the turn at 10 deg/s in line 3 .* do not tell"):
         read_measurements(written(tmp_path, rows))
 
 
@@ -180,5 +213,9 @@ def test_short_rests_of_which_rows_are_lost_are_used_or_told_with_the_reason(mon
         return from_samples(replace(rows, **columns), time[kept])
 
     assert len(lossy(100.0, 6).output) == 4 * 4 * 6
-    with pytest.raises(InputError, match=r"of which 7 samples of about 20 are recorded.*lose fewer samples"):
-        lossy(20.0, 0)
+    some = lossy(20.0, 0)
+    assert len(some.output) == 94 and some.left_out[0].startswith("2 of 96 turns left out: no rest after")
+    every, found = decouple(lossy(100.0, 0)), decouple(some)
+    assert found.se is not None and abs(found.K - every.K) < 3.0 * float(str(found.se["K"]))
+    with pytest.raises(InputError, match=r"of which 14 samples of about 20 are recorded.*lose fewer samples"):
+        lossy(10.0, 0)
