@@ -15,7 +15,6 @@ from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows, verdict_sentences
-from fogml.numerals import to_error, with_error
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
@@ -139,22 +138,11 @@ def _simulated(settings: NorthSettings) -> dict[str, Any]:
 
 
 def _print_north(values: dict[str, Any], terminal: Terminal) -> None:
-    se = f" ± {number(values['se'])}" if values["se"] is not None else ""
-    if values["kind"] == "recorded":
-        azimuth = to_error(values["azimuth_deg"], values["se"])
-        terminal.say(f"{values['source']}: azimuth {azimuth}{se} deg ({values['method']})")
-        drift, drift_se = values["drift_deg_h_per_h"], values["drift_se"]
-        if drift is not None:
-            terminal.say(f"linear drift {with_error(drift, drift_se)} deg/h per h")
-            terminal.say(f"a plain seek is off by {number(values['error_deg'])} deg for it")
-    else:
-        terminal.say(
-            f"simulated at {values['true_azimuth_deg']:g} deg: found {values['azimuth_deg']:.5f}{se} deg "
-            f"({values['way']}), error {number(values['error_deg'])} deg"
-        )
-        from fogml.report.north_page import ways_table
+    from fogml.report.north_page import headline_tiles, verdict_sentences, ways_table
 
-        terminal.show(ways_table(values))
+    terminal.say(" ".join(verdict_sentences(values)))
+    terminal.tiles(headline_tiles(values))
+    terminal.show(ways_table(values))
     azimuths = [", ".join(f"{a:.2f}" for a in values[f"{k}_azimuth_deg"]) for k in ("quiet", "worst")]
     quiet, worst = (f"{told} deg" if told else "none" for told in azimuths)
     terminal.say(f"quiet azimuths {quiet}; worst {worst}")

@@ -74,20 +74,12 @@ def _simulation(place: int, twin: str, facts: Facts) -> str:
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.plan_page import planned_rehearsal, wanted_table
+    from fogml.report.plan_page import planned_rehearsal, verdict_sentences, wanted_table
 
     for run in values["runs"]:
         terminal.say(f"{run['programme']}: {short(run['hours'])} h, {run['summary']}")
+    terminal.say(" ".join(verdict_sentences(values)))
     terminal.show(wanted_table(values), "Expected standard errors")
-    for item in values["separations"]:
-        told = "enough to tell" if item["enough"] else "not enough to tell"
-        what = " and ".join(item["separates"])
-        terminal.say(
-            f"{what}: distance {short(item['distance'])}, {told} (from {values['least_distance']:g} on)"
-        )
     terminal.show(planned_rehearsal(values), "What a diagnosis of these runs would name")
-    hidden = [e["name"] for e in values["wanted"] if not e["shown"]]
-    if hidden:
-        terminal.note(f"{', '.join(hidden)}: does not show at its usual size, or no better than beforehand")
     for text in values["assumed"]:
         terminal.note(f"assumed: {text}")

@@ -11,7 +11,7 @@ from fogml.cli.run_commands import ImportSettings, InspectSettings, NoiseSetting
 from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs, tell
 from fogml.cli.terminal import Terminal, number, span
 from fogml.errors import InputError
-from fogml.numerals import duration, lowest_from, percent
+from fogml.numerals import duration, percent
 from fogml.outputs import scratch_folder, whole_file, whole_folder
 from fogml.readers import plain_path
 from fogml.runs.columns import header
@@ -247,24 +247,13 @@ def _floor(run: Run, taus_s: Sequence[float]) -> dict[str, Any] | None:
 
 
 def _print_noise(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.noise_page import deviations_table, replicates_table, terms_table
+    from fogml.report.noise_page import deviations_table, headline_tiles, replicates_table, terms_table
 
     kind = "overlapping" if values["overlapping"] else "not overlapping"
     level = percent(values["level"], 0)
     terminal.show(deviations_table(values), f"{values['run']}: Allan deviation, {kind}, {level} intervals")
     terminal.show(terms_table(values), "IEEE 952 terms")
     terminal.show(replicates_table(values))
-    floor = values.get("floor")
-    if floor:
-        low, high = floor["ci"][0]
-        over = duration(floor["averaging_s"][0])
-        terminal.say(
-            f"noise floor of averages over {over}: {number(floor['value'][0])} deg/h "
-            f"({level} from {number(low)} to {number(high)}), from {floor['source']}"
-        )
-    minimum = values["minimum"]
-    terminal.say(
-        f"minimum: {number(minimum['adev'])} deg/h at {duration(minimum['tau_s'])}{lowest_from(values)}"
-    )
+    terminal.tiles(headline_tiles(values))
     for text in (*values["notes"], *(finding["message"] for finding in values["findings"])):
         terminal.say(text)

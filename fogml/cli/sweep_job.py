@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fogml.cli.model_commands import SweepSettings
 from fogml.cli.options import Repairing
 from fogml.cli.runs import open_legs, open_runs
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
@@ -56,7 +56,7 @@ def _read(paths: tuple[str, ...], repair: Repairing, identities: list[Any]) -> l
 
 def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
     """Run the trials that are missing, judge the winner once on the test runs, write the results."""
-    from fogml.report.sweep_page import sweep_page
+    from fogml.report.sweep_page import pareto_table, sweep_page, verdict_sentences
     from fogml.tuning.sweep import run_sweep, study_json
 
     tracker = None if settings.track is None else Tracker(settings.track, "fogml sweep", terminal.note)
@@ -91,7 +91,9 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
         (folder / "sweep.html").write_text(page, encoding="utf-8")
     if tracker is not None:
         _track(tracker, values, str(study.user_attrs.get(IDENTITY)))
-    _print(values, terminal)
+    terminal.say(" ".join(verdict_sentences(values, judgement)))
+    terminal.show(pareto_table(values))
+    terminal.say(values["winner"]["command"])
     terminal.result(values)
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'sweep.html'}")
 
@@ -138,24 +140,3 @@ def _judge(
 
     train = TrainSettings.model_validate(parse_yaml(best, "best.yaml"))
     return fit_and_judge(train, runs, test_runs, terminal)[1]
-
-
-def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.sweep_page import pareto_table, parts_held_out, standing
-
-    for text in standing(values["winner"]):
-        terminal.say(text)
-    counts = values["counts"]
-    terminal.say(
-        f"{counts['complete'] + counts['pruned']} trials finished, {counts['pruned']} of them pruned or "
-        f"refused, judged on {parts_held_out(values)}."
-    )
-    terminal.show(pareto_table(values))
-    judged = values["winner"].get("judged")
-    for run in judged["test"] if judged else []:
-        terminal.say(
-            f"{run['run']}, judged once: rms {number(run['before']['rms'])} before, "
-            f"{number(run['after']['rms'])} deg/h after, floor {number(run['floor'])} "
-            f"({run['averaging_s']:g} s averages)"
-        )
-    terminal.say(values["winner"]["command"])

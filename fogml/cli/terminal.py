@@ -8,7 +8,7 @@ import shutil
 import sys
 import textwrap
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Protocol, TextIO
@@ -21,6 +21,7 @@ from fogml.numerals import percent, short
 from fogml.processes import heed_interrupt
 
 if TYPE_CHECKING:
+    from fogml.report.page import Tile
     from fogml.report.tables import Table
 
 _LINE_EVERY_S = 10.0
@@ -122,6 +123,12 @@ class Terminal:
             for row, cells in zip(table.rows, rows):
                 cells.append("✓" if row.mark == "chosen" else "")
         self.table(title or table.caption, heads, rows)
+
+    def tiles(self, tiles: Iterable[Tile]) -> None:
+        """A page's headline figures, a line each."""
+        for tile in tiles:
+            note = f", {tile.note}" if tile.note else ""
+            self.say(f"{tile.name}: {f'{tile.value} {tile.unit}'.strip()}{note}")
 
     @contextmanager
     def work(self, what: str, total: float | None = None) -> Iterator[Work]:

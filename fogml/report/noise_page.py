@@ -29,7 +29,7 @@ def noise_page(noise: Mapping[str, Any]) -> str:
         name=name,
         noise=noise,
         verdict=_verdict(noise),
-        tiles=_tiles(noise),
+        tiles=headline_tiles(noise),
         allan=allan_plot(noise),
         terms=terms_table(noise),
         table=deviations_table(noise),
@@ -57,7 +57,8 @@ def _verdict(noise: Mapping[str, Any]) -> str:
     return f"{noise.get('run', 'The run')} shows {' and '.join(parts)}."
 
 
-def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
+def headline_tiles(noise: Mapping[str, Any]) -> list[Tile]:
+    """Terms that the data show, floor and minimum."""
     tiles = []
     for key in ("N", "B", "K"):
         term = noise["terms"].get(key) or {}

@@ -25,11 +25,11 @@ def north_page(values: Mapping[str, Any]) -> str:
         kicker=("North from recorded positions" if recorded else "North seeking under a drift")
         + (" · synthetic data" if values["synthetic"] else ""),
         values=values,
-        verdict=_recorded_verdict(values) if recorded else _simulated_verdict(values),
-        tiles=_tiles(values),
+        verdict=verdict_sentences(values),
+        tiles=headline_tiles(values),
         circle=error_by_azimuth(values),
         map=error_map(values),
-        ways=None if recorded else ways_table(values),
+        ways=ways_table(values),
         quiet=None if recorded else _quiet(values),
         stays=_stays(values) if recorded else None,
         about=_about(values),
@@ -37,7 +37,10 @@ def north_page(values: Mapping[str, Any]) -> str:
     )
 
 
-def _recorded_verdict(values: Mapping[str, Any]) -> list[str]:
+def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
+    """What was found, and what it holds for."""
+    if values["kind"] != "recorded":
+        return _simulated_verdict(values)
     within = f" ± {number(values['se'], 2)}" if values["se"] is not None else ""
     sentences = [f"The azimuth is {to_error(values['azimuth_deg'], values['se'])}{within} deg."]
     drift = values["drift_deg_h_per_h"]
@@ -70,7 +73,8 @@ def _simulated_verdict(values: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def _tiles(values: Mapping[str, Any]) -> list[Tile]:
+def headline_tiles(values: Mapping[str, Any]) -> list[Tile]:
+    """The azimuth, its errors, and the drift that is seen."""
     tiles = [
         Tile(
             "Azimuth found",
@@ -91,8 +95,10 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
     return tiles
 
 
-def ways_table(values: Mapping[str, Any]) -> Table:
-    """What each way to spend the time comes to; the simulated one is marked."""
+def ways_table(values: Mapping[str, Any]) -> Table | None:
+    """What each way to spend the time comes to, the simulated one marked; None of a recorded seek."""
+    if values["kind"] == "recorded":
+        return None
     rows = [
         Row(
             (

@@ -178,7 +178,7 @@ def plan_page(values: Mapping[str, Any]) -> str:
         "plan.html",
         title="Plan",
         values=values,
-        verdict=_verdict(values),
+        verdict=verdict_sentences(values),
         tiles=_tiles(values),
         runs=[
             {
@@ -204,7 +204,8 @@ def planned_rehearsal(values: Mapping[str, Any]) -> Table | None:
     return rehearsal_table(rehearsal, {id: declared.title for id, declared in effects().items()})
 
 
-def _verdict(values: Mapping[str, Any]) -> list[str]:
+def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
+    """What the runs make known, what they don't, and what they tell apart."""
     hidden = [e["name"] for e in values["wanted"] if not e["shown"]]
     close = [s for s in values["separations"] if not s["enough"]]
     shown = [e["name"] for e in values["wanted"] if e["shown"]]

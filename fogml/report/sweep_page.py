@@ -198,7 +198,7 @@ def sweep_page(study: Mapping[str, Any], judgement: Judgement | None = None) -> 
         "sweep.html",
         title=f"{study['study']} – sweep",
         study=study,
-        verdict=_verdict(study, judgement),
+        verdict=verdict_sentences(study, judgement),
         tiles=_tiles(study, judgement),
         winner=_winner(study),
         history=history(study),
@@ -237,7 +237,8 @@ def _plain(value: Any) -> str:
     return number(value) if isinstance(value, float) else str(value)
 
 
-def _verdict(study: Mapping[str, Any], judgement: Judgement | None) -> list[str]:
+def verdict_sentences(study: Mapping[str, Any], judgement: Judgement | None) -> list[str]:
+    """What won, on what, and what it leaves of the test runs."""
     counts, best = study["counts"], study["winner"]
     finished = counts["complete"] + counts["pruned"]
     sentences = [

@@ -91,7 +91,7 @@ def test_north_of_a_recording(positions: Path, tmp_path: Path, invoke, invoke_js
     assert told["drift_deg_h_per_h"] == pytest.approx(2.0, abs=1e-5)
     assert told["quiet_azimuth_deg"] == pytest.approx([135.0, 315.0])
     out = tmp_path / "north"
-    assert "azimuth 77.0" in invoke("lab", "north", "--positions", positions, "-o", out).stdout
+    assert "azimuth is 77.0" in invoke("lab", "north", "--positions", positions, "-o", out).stdout
     assert sorted(p.name for p in out.iterdir()) == ["lab-north.config.yaml", "north.html", "north.json"]
 
 

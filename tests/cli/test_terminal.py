@@ -11,6 +11,7 @@ import pytest
 from fogml.cli.terminal import Terminal, fitted, number, span
 from fogml.gap.result_parts import Rehearsed
 from fogml.report.gap_tables_ahead import rehearsal_table
+from fogml.report.page import Tile
 from fogml.report.tables import Row, Table
 from fogml.twin.registry import effects
 
@@ -57,6 +58,11 @@ def test_a_page_s_table_has_units_its_caption_and_what_is_chosen(capsys) -> None
         ["a", "1×10⁻⁶", "✓"],
         ["b", "2"],
     ]
+
+
+def test_a_page_s_tiles_are_lines(capsys) -> None:
+    Terminal().tiles([Tile("Minimum", "0.04", "deg/h", "at 800 s"), Tile("Runs", "3")])
+    assert capsys.readouterr().out.splitlines() == ["Minimum: 0.04 deg/h, at 800 s", "Runs: 3"]
 
 
 def test_no_figure_is_lost_where_they_do_not_fit(monkeypatch, capsys) -> None:
