@@ -7,9 +7,9 @@ from pathlib import Path
 from fogml.cli.run_commands import DemoSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import SHIPPED
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal
 from fogml.cli.train_job import TrainSettings, fit_and_judge, say_advice, write_results
-from fogml.numerals import short
+from fogml.numerals import number, short
 from fogml.outputs import whole_folder
 from fogml.validation.judge import judge
 from fogml.validation.report_json import judgement_json

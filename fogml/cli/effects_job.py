@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal
 from fogml.cli.twin_commands import EffectsSettings
-from fogml.numerals import short
+from fogml.numerals import number, short
 from fogml.outputs import whole_folder
 from fogml.twin.effect import Effect
 from fogml.twin.registry import effect, effects
@@ -101,7 +101,7 @@ def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
         [
             quantity["name"],
             quantity["unit"],
-            *(" to ".join(map(number, quantity[grade])) for grade in ("tactical", "navigation")),
+            *(" to ".join(map(short, quantity[grade])) for grade in ("tactical", "navigation")),
             quantity["meaning"],
         ]
         for quantity in (card["amplitude"], *card["shape"])

@@ -6,7 +6,7 @@ from typing import Any
 
 from fogml.cli.lab import WAYS, MisalignmentSettings, NorthSettings, RateSettings
 from fogml.cli.runs import open_run, tell
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, known_are
 from fogml.lab.misalignment_input import read_measurements
 from fogml.lab.misalignment_json import misalignment_json
@@ -14,7 +14,7 @@ from fogml.lab.north import Drift, Scheme, check_sense, horizontal_rate
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
-from fogml.lab.rate_words import result_rows, verdict_sentences
+from fogml.lab.rate_words import verdict_sentences
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
@@ -70,12 +70,11 @@ def _values(settings: RateSettings, terminal: Terminal) -> dict[str, Any]:
 
 
 def _print_rate(values: dict[str, Any], terminal: Terminal) -> None:
-    terminal.say(" ".join(verdict_sentences(values, number)))
-    rows = [[row.quantity, row.value, row.se, row.unit, row.remark] for row in result_rows(values, number)]
-    title = f"{values['source']}: tests on a rate table" + (
-        " (synthetic data)" if values["synthetic"] else ""
-    )
-    terminal.table(title, ["quantity", "value", "standard error", "unit", "remark"], rows)
+    from fogml.report.rate_page import result_table
+
+    terminal.say(" ".join(verdict_sentences(values)))
+    synthetic = " (synthetic data)" if values["synthetic"] else ""
+    terminal.show(result_table(values), f"{values['source']}: tests on a rate table{synthetic}")
     for note in values["notes"]:
         terminal.say(note)
 

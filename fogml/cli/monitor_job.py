@@ -11,7 +11,7 @@ from typing import Any
 
 from fogml.cli.run_commands import MonitorSettings
 from fogml.cli.runs import check_named_once, note_wrong, open_blocks
-from fogml.cli.terminal import UNITS_SHOWN, Terminal, number
+from fogml.cli.terminal import UNITS_SHOWN, Terminal
 from fogml.errors import InputError, counted, in_one_line
 from fogml.fleet.tasks import FLEET
 from fogml.json_files import finite_json, read_json, write_json
@@ -21,6 +21,7 @@ from fogml.monitor.monitor_json import monitor_json
 from fogml.monitor.record import RunRecord, record_run
 from fogml.monitor.store import open_store
 from fogml.monitor.watch import watch
+from fogml.numerals import number
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 

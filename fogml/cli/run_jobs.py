@@ -9,9 +9,9 @@ from typing import Any
 
 from fogml.cli.run_commands import ImportSettings, InspectSettings, NoiseSettings
 from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs, tell
-from fogml.cli.terminal import Terminal, number, span
+from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
-from fogml.numerals import duration, percent
+from fogml.numerals import duration, number, percent
 from fogml.outputs import scratch_folder, whole_file, whole_folder
 from fogml.readers import plain_path
 from fogml.runs.columns import header
@@ -69,7 +69,7 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
                 }
             )
         settings.write_into(folder, "import")
-    rows = [[run.name, str(len(run)), span(run.span_s)] for run in runs]
+    rows = [[run.name, str(len(run)), duration(run.span_s)] for run in runs]
     terminal.table(f"Written to {settings.out}", ["run", "rows", "span"], rows)
     terminal.result({"schema": "fogml.import/1", "runs": written})
 

@@ -17,7 +17,7 @@ import click
 
 from fogml.escaping import terminal_text, visible
 from fogml.json_files import json_text
-from fogml.numerals import percent, short
+from fogml.numerals import percent
 from fogml.processes import heed_interrupt
 
 if TYPE_CHECKING:
@@ -155,11 +155,6 @@ def fitted(text: str, stream: TextIO) -> str:
     return textwrap.fill(text, width, subsequent_indent=below, break_long_words=False, break_on_hyphens=False)
 
 
-def span(seconds: float) -> str:
-    """A span of time for people: in hours, below one in minutes."""
-    return f"{number(seconds / 3600)} h" if seconds >= 3600.0 else f"{number(seconds / 60)} min"
-
-
 _UNBOUNDED = 10_000
 """Width of a table that nobody sees in a terminal [characters]."""
 _FIGURE = re.compile("[-−+]?[0-9]")
@@ -283,13 +278,3 @@ def _bar(what: str, total: float | None) -> Iterator[Work]:
 
 UNITS_SHOWN = 40
 """Units that a table on the terminal holds; pages and files hold all."""
-
-
-def number(value: float | None) -> str:
-    """A figure for a table: four significant digits; a dash where there is none.
-
-    Powers of ten only below 1e-4 and from 1e7 on.
-    """
-    if value is None:
-        return "–"
-    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else short(value, 4)

@@ -11,10 +11,10 @@ from fogml.cli.from_diagnosis import unfitted_model
 from fogml.cli.model_commands import TrainSettings
 from fogml.cli.options import LimitSettings
 from fogml.cli.runs import open_runs
-from fogml.cli.terminal import Terminal, Work, number
+from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
-from fogml.numerals import percent
+from fogml.numerals import number, percent
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.validation.certified import held_constant, of_10_s, over_temperature

@@ -10,10 +10,11 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.cli.runs import open_run
-from fogml.cli.terminal import Terminal, number, span
+from fogml.cli.terminal import Terminal
 from fogml.cli.twin_commands import ReplaySettings, SimulateSettings
 from fogml.errors import InputError
 from fogml.json_files import check_finite
+from fogml.numerals import duration, number
 from fogml.runs.columns import REPLAYED
 from fogml.runs.facts import facts_from
 from fogml.runs.other_rate import at_times_of, is_simulator_output, read_gnss_ins_sim
@@ -171,7 +172,7 @@ def _print_simulation(settings: SimulateSettings, world: World, rows: int, termi
         "notes": list(twin.notes),
     }
     terminal.say(
-        f"{rows} samples every {settings.sample_s:g} s, {span(programme.total_s)} of {programme.name}, "
+        f"{rows} samples every {settings.sample_s:g} s, {duration(programme.total_s)} of {programme.name}, "
         f"written to {settings.out}"
     )
     on = ", ".join(twin.settings) or "none"

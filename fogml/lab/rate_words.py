@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from fogml.lab.rate_response import HALF_POWER
-from fogml.numerals import unit_words, with_error
-
-Number = Callable[[float | None], str]
+from fogml.numerals import number, unit_words, with_error
 
 
 class ResultRow(NamedTuple):
@@ -21,7 +19,7 @@ class ResultRow(NamedTuple):
     remark: str
 
 
-def verdict_sentences(values: Mapping[str, Any], number: Number) -> list[str]:
+def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
     """What a ``rate.json`` comes to: the scale factor, or what there is in its place; then what limits it."""
     line, held, band = values["scale_factor"], values["range"], values["bandwidth"]
     sentences = []
@@ -31,7 +29,7 @@ def verdict_sentences(values: Mapping[str, Any], number: Number) -> list[str]:
             straight = f", linear within {number(line['nonlinearity_ppm'])} ppm"
         reach = "" if held is None else f" up to {number(held['followed_deg_s'])} deg/s"
         ends = None if line["ci90"] is None else [1e6 * (end - 1.0) for end in line["ci90"]]
-        off = _within_90(1e6 * (line["scale_factor"] - 1.0), ends, "ppm", number)
+        off = _within_90(1e6 * (line["scale_factor"] - 1.0), ends, "ppm")
         sentences.append(f"The scale factor is {off} off the nominal one{straight}{reach}.")
         if held is not None and held["exceeded_deg_s"] is not None:
             sentences.append(f"At {number(held['exceeded_deg_s'])} deg/s the output no longer follows.")
@@ -39,33 +37,33 @@ def verdict_sentences(values: Mapping[str, Any], number: Number) -> list[str]:
         sentences.append(f"The bandwidth is {number(band['half_power_hz'])} Hz.")
     sensed = values["temperature_sensitivity"]
     if sensed is not None:
-        told = _within_90(sensed["ppm_per_degC"], sensed["ci90"], "ppm/°C", number)
+        told = _within_90(sensed["ppm_per_degC"], sensed["ci90"], "ppm/°C")
         sentences.append(f"It moves by {told} with temperature.")
     return sentences or ["These runs tell no scale factor; the notes say what it needs."]
 
 
-def _within_90(value: float, ends: Sequence[float] | None, unit: str, number: Number) -> str:
+def _within_90(value: float, ends: Sequence[float] | None, unit: str) -> str:
     """``16.7 ± 0.3 ppm (90 %)``."""
     if ends is None or not ends[1] > ends[0]:
         return f"{number(value)} {unit}"
     return f"{with_error(value, 0.5 * (ends[1] - ends[0]))} {unit} (90 %)"
 
 
-def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
+def result_rows(values: Mapping[str, Any]) -> list[ResultRow]:
     """What a ``rate.json`` tells, quantity by quantity; what was not tested is left out."""
-    return [row._replace(unit=unit_words(row.unit) or row.unit) for row in _rows(values, number)]
+    return [row._replace(unit=unit_words(row.unit) or row.unit) for row in _rows(values)]
 
 
-def _rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
+def _rows(values: Mapping[str, Any]) -> list[ResultRow]:
     rows = []
     line = values["scale_factor"]
     if line is not None:
         ppm = f"{1e6 * (line['scale_factor'] - 1.0):+.1f} ppm".replace("-", "\N{MINUS SIGN}")
-        ppm += _within(line["ci90"], 1e6, "ppm", number)
+        ppm += _within(line["ci90"], 1e6, "ppm")
         rows.append(ResultRow("scale factor", f"{line['scale_factor']:.7f}", number(line["se"]), "1", ppm))
         for name, words in (("nonlinearity", _from_to), ("asymmetry", _plus_minus)):
             if line[f"{name}_ppm"] is not None:
-                remark = words(line[f"{name}_ci90_ppm"], number)
+                remark = words(line[f"{name}_ci90_ppm"])
                 rows.append(ResultRow(name, number(line[f"{name}_ppm"]), "", "ppm", remark))
     held = values["range"]
     if held is not None:
@@ -80,13 +78,13 @@ def _rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
         ("resolution", "resolution"),
     ):
         if values[key] is not None:
-            rows.append(ResultRow(name, bracketed(values[key], number), "", "deg/h", ""))
-    rows += _response(values, number)
+            rows.append(ResultRow(name, bracketed(values[key]), "", "deg/h", ""))
+    rows += _response(values)
     sensed = values["temperature_sensitivity"]
     if sensed is not None:
         slope = number(sensed["ppm_per_degC"])
         remark = f"over {len(sensed['temperature'])} temperatures"
-        remark += _within(sensed["ci90"], 1.0, "ppm/°C", number)
+        remark += _within(sensed["ci90"], 1.0, "ppm/°C")
         rows.append(ResultRow("temperature sensitivity", slope, number(sensed["se"]), "ppm/degC", remark))
         if sensed["curvature_ppm_per_degC2"] is not None:
             curve = number(sensed["curvature_ppm_per_degC2"])
@@ -96,18 +94,18 @@ def _rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     return rows
 
 
-def _within(ends: Sequence[float] | None, scale: float, unit: str, number: Number) -> str:
+def _within(ends: Sequence[float] | None, scale: float, unit: str) -> str:
     """``, 90 %: ± 0.3 ppm``."""
     if ends is None:
         return ""
     return f", 90 %: ± {number(0.5 * scale * (ends[1] - ends[0]))} {unit}"
 
 
-def _plus_minus(ends: Sequence[float] | None, number: Number) -> str:
-    return _within(ends, 1.0, "ppm", number).removeprefix(", ")
+def _plus_minus(ends: Sequence[float] | None) -> str:
+    return _within(ends, 1.0, "ppm").removeprefix(", ")
 
 
-def _from_to(ends: Sequence[float] | None, number: Number) -> str:
+def _from_to(ends: Sequence[float] | None) -> str:
     """``90 %: 12 to 15 ppm``."""
     if ends is None:
         return ""
@@ -115,7 +113,7 @@ def _from_to(ends: Sequence[float] | None, number: Number) -> str:
     return told if ends[0] > 0.0 else f"{told}; noise alone may make as much"
 
 
-def _response(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
+def _response(values: Mapping[str, Any]) -> list[ResultRow]:
     rows = []
     band = values["bandwidth"]
     if band is not None:
@@ -140,7 +138,7 @@ def _response(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     return rows
 
 
-def bracketed(found: Mapping[str, float | None], number: Number) -> str:
+def bracketed(found: Mapping[str, float | None]) -> str:
     """``0.2 to 0.5``, ``at most 0.001``, ``above 50``."""
     above, below = found["above_deg_h"], found["below_deg_h"]
     if below is None:

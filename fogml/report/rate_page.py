@@ -24,9 +24,9 @@ def rate_page(values: Mapping[str, Any]) -> str:
         name=values["source"],
         kicker="Tests on a rate table" + (" · synthetic data" if values["synthetic"] else ""),
         values=values,
-        verdict=verdict_sentences(values, number),
+        verdict=verdict_sentences(values),
         tiles=_tiles(values),
-        result=_result(values),
+        result=result_table(values),
         figures=[
             figure for figure in (_ladder(values), _small(values), _gains(values), _warm(values)) if figure
         ],
@@ -61,8 +61,9 @@ def _bracket_tile(name: str, found: Mapping[str, float | None]) -> Tile:
     return Tile(name, number(below), "deg/h", f"more than {number(above)}" if above else "or less")
 
 
-def _result(values: Mapping[str, Any]) -> Table:
-    rows = tuple(tuple(row) for row in result_rows(values, number))
+def result_table(values: Mapping[str, Any]) -> Table:
+    """What the tests tell, quantity by quantity."""
+    rows = tuple(tuple(row) for row in result_rows(values))
     return Table("Quantity | >Value | >Standard error | Unit | Remark", rows)
 
 

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from fogml.cli.terminal import Terminal, fitted, number, span
+from fogml.cli.terminal import Terminal, fitted
 from fogml.gap.result_parts import Rehearsed
 from fogml.report.gap_tables_ahead import rehearsal_table
 from fogml.report.page import Tile
@@ -159,16 +159,3 @@ def test_a_note_stands_on_a_line_of_its_own_above_the_bar(monkeypatch) -> None:
         terminal.note("unit A failed")
     before, _, after = screen.getvalue().partition("unit A failed")
     assert before.endswith("\x1b[2K") and after.startswith("\n")
-
-
-@pytest.mark.parametrize(("seconds", "told"), [(270, "4.5 min"), (24300, "6.75 h"), (2.15797e6, "599.4 h")])
-def test_spans_are_hours_and_minutes(seconds: float, told: str) -> None:
-    assert span(seconds) == told
-
-
-@pytest.mark.parametrize(
-    ("value", "told"),
-    [(None, "–"), (0.11182, "0.1118"), (79341.3, "79341"), (-3.602e5, "-360200"), (2.5e8, "2.5e+08")],
-)
-def test_seconds_of_a_day_have_no_exponent(value: float | None, told: str) -> None:
-    assert number(value) == told

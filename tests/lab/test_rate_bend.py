@@ -10,7 +10,6 @@ import pytest
 from fogml.lab.rate_errors import greatest_within
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_words import result_rows, verdict_sentences
-from fogml.numerals import number
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 
@@ -54,8 +53,7 @@ def test_a_bend_is_told_and_a_straight_line_has_none() -> None:
 
 def test_words_say_where_noise_alone_may_make_it() -> None:
     remarks = {
-        cubic: {row.quantity: row.remark for row in result_rows(told(cubic, 3), lambda x: f"{x:.3g}")}
-        for cubic in (0.0, 20.0)
+        cubic: {row.quantity: row.remark for row in result_rows(told(cubic, 3))} for cubic in (0.0, 20.0)
     }
     assert "noise alone may make as much" in remarks[0.0]["nonlinearity"]
     assert remarks[20.0]["nonlinearity"].startswith("90 %: ") and "noise" not in remarks[20.0]["nonlinearity"]
@@ -64,7 +62,7 @@ def test_words_say_where_noise_alone_may_make_it() -> None:
 def test_a_sentence_says_what_the_test_comes_to() -> None:
     values = told(20.0, 3)
     low, high = (1e6 * (end - 1.0) for end in values["scale_factor"]["ci90"])
-    [sentence] = verdict_sentences(values, number)
+    [sentence] = verdict_sentences(values)
     found = re.fullmatch(
         r"The scale factor is (\S+) ± (\S+) ppm \(90 %\) off the nominal one, linear within (\S+) ppm up to "
         r"100 deg/s\.",
@@ -74,9 +72,7 @@ def test_a_sentence_says_what_the_test_comes_to() -> None:
         [0.5 * (low + high), 0.5 * (high - low), values["scale_factor"]["nonlinearity_ppm"]], rel=0.05
     )
     bare = dict.fromkeys(("scale_factor", "range", "bandwidth", "temperature_sensitivity"))
-    assert verdict_sentences(bare, number) == [
-        "These runs tell no scale factor; the notes say what it needs."
-    ]
+    assert verdict_sentences(bare) == ["These runs tell no scale factor; the notes say what it needs."]
 
 
 def test_three_rates_tell_none() -> None:
