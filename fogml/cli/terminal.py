@@ -148,7 +148,12 @@ def fitted(text: str, stream: TextIO) -> str:
     Blocks of lines and commands stay as they are, to be copied.
     """
     text = terminal_text(text)
-    if "\n" in text or text.startswith("fogml ") or not stream.isatty():
+    if "\n" in text or text.startswith("fogml "):
+        return text
+    # A locale without a letter has a question mark for it, in sentences as in tables.
+    encoding = stream.encoding or "utf-8"
+    text = text.encode(encoding, "replace").decode(encoding)
+    if not stream.isatty():
         return text
     width = shutil.get_terminal_size().columns
     below = " " * (len(text) - len(text.lstrip()) + 2)
