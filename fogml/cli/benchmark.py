@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, ClassVar
-
-from pydantic import Field
+from typing import ClassVar
 
 from fogml.benchmark.rounds import SEED, TRACKS, Track, read_round
 from fogml.cli import options
-from fogml.cli.given import argument, option
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Settings, placed, setting
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, counted
 from fogml.json_files import write_json
@@ -22,16 +19,14 @@ _NO_ROUND = "no folder is given; name the round's folder"
 class RoundSettings(Settings):
     """What every job on a round takes."""
 
-    directory: Annotated[
-        str | None,
-        argument(
-            "DIR",
-            "The round's folder.",
-            reads=True,
-            needed=_NO_ROUND,
-            lost="no such folder; make a round first: fogml benchmark make DIR",
-        ),
-    ] = None
+    directory: str | None = placed(
+        None,
+        "DIR",
+        "The round's folder.",
+        reads=True,
+        needed=_NO_ROUND,
+        lost="no such folder; make a round first: fogml benchmark make DIR",
+    )
 
     def folder(self) -> str:
         """The round's folder."""
@@ -46,17 +41,14 @@ class MakeSettings(RoundSettings):
     """
 
     job: ClassVar[str] = "fogml.cli.benchmark:make_and_tell"
-    directory: Annotated[
-        str | None,
-        argument("DIR", "The round's folder.", writes=True, needed=_NO_ROUND),
-    ] = None
-    seed: Annotated[int, option("Seed of an open round; 2026 is the one whose results ship.")] = Field(
-        SEED, ge=0, lt=1_000_000
+    directory: str | None = placed(None, "DIR", "The round's folder.", writes=True, needed=_NO_ROUND)
+    seed: int = setting(
+        SEED, "Seed of an open round; 2026 is the one whose results ship.", ge=0, lt=1_000_000
     )
-    closed: Annotated[bool, option("Draw the seed, and keep it.", "--closed")] = False
-    drift: Annotated[int, option("Synthetic units of the drift track.", metavar="N")] = 12
-    diagnosis: Annotated[int, option("Cases of the diagnosis track.", metavar="N")] = 12
-    real: Annotated[bool, option("With the real legs that ship.", "--real/--no-real")] = True
+    closed: bool = setting(False, "Draw the seed, and keep it.", "--closed")
+    drift: int = setting(12, "Synthetic units of the drift track.", metavar="N")
+    diagnosis: int = setting(12, "Cases of the diagnosis track.", metavar="N")
+    real: bool = setting(True, "With the real legs that ship.", "--real/--no-real")
     workers: options.Workers = 2
 
 
@@ -64,25 +56,23 @@ class RunSettings(RoundSettings):
     """Answer the cases that have no answer yet, in sealed processes that see a case's files alone."""
 
     job: ClassVar[str] = "fogml.cli.benchmark:run_and_tell"
-    track: Annotated[Track, option("Which track.", metavar="|".join(TRACKS))] = "drift"
-    methods: Annotated[
-        list[str],
-        option(
-            "Drift: a model's name; diagnosis: a method of 'blind run'; or module:function. Repeatable.",
-            "--method",
-            metavar="NAME",
-            known="fogml.models.names:MODEL_NAMES",
-            needed="no method is given; name one: --method auto",
-        ),
-    ] = []
+    track: Track = setting("drift", "Which track.", metavar="|".join(TRACKS))
+    methods: list[str] = setting(
+        [],
+        "Drift: a model's name; diagnosis: a method of 'blind run'; or module:function. Repeatable.",
+        "--method",
+        metavar="NAME",
+        known="fogml.models.names:MODEL_NAMES",
+        needed="no method is given; name one: --method auto",
+    )
     features: options.Features = None
-    code: Annotated[
-        str | None, option("Where module:function lies.", metavar="FOLDER", reads=True, lost="no such folder")
-    ] = None
-    name: Annotated[str | None, option("What the answers are called.", metavar="NAME")] = None
+    code: str | None = setting(
+        None, "Where module:function lies.", metavar="FOLDER", reads=True, lost="no such folder"
+    )
+    name: str | None = setting(None, "What the answers are called.", metavar="NAME")
     workers: options.Workers = 2
-    limit: Annotated[float, option("Time that a case may take.", metavar="SECONDS")] = 600.0
-    retry: Annotated[bool, option("Try failed cases again.", "--retry")] = False
+    limit: float = setting(600.0, "Time that a case may take.", metavar="SECONDS")
+    retry: bool = setting(False, "Try failed cases again.", "--retry")
 
 
 class ScoreSettings(RoundSettings):
@@ -92,14 +82,11 @@ class ScoreSettings(RoundSettings):
     """
 
     job: ClassVar[str] = "fogml.cli.benchmark:score_and_write"
-    entries: Annotated[
-        list[str], option("Score these alone; may be repeated.", "--entry", metavar="NAME")
-    ] = []
+    entries: list[str] = setting([], "Score these alone; may be repeated.", "--entry", metavar="NAME")
     workers: options.Workers = 2
-    out: Annotated[
-        str | None,
-        option("Folder for what is written; the round's if none.", "--out", "-o", metavar="DIR", writes=True),
-    ] = None
+    out: str | None = setting(
+        None, "Folder for what is written; the round's if none.", "--out", "-o", metavar="DIR", writes=True
+    )
 
 
 def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:

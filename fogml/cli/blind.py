@@ -9,8 +9,8 @@ from pydantic import BeforeValidator
 
 from fogml.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.cli import options
-from fogml.cli.given import argument, option
-from fogml.cli.settings import Settings
+from fogml.cli.given import option
+from fogml.cli.settings import Settings, placed, setting
 from fogml.errors import InputError
 
 WANTED = "wanted"
@@ -39,16 +39,14 @@ LEDGER = "experiments/gap_blind/final_uses.json"
 class SuiteSettings(Settings):
     """What every job on a suite takes."""
 
-    directory: Annotated[
-        str | None,
-        argument(
-            "DIR",
-            "The suite's folder.",
-            reads=True,
-            needed=_NO_SUITE,
-            lost="no such folder; make a suite first: fogml blind make DIR",
-        ),
-    ] = None
+    directory: str | None = placed(
+        None,
+        "DIR",
+        "The suite's folder.",
+        reads=True,
+        needed=_NO_SUITE,
+        lost="no such folder; make a suite first: fogml blind make DIR",
+    )
 
     def folder(self) -> BlindFolder:
         """The suite."""
@@ -63,45 +61,35 @@ class MakeSettings(SuiteSettings):
     """
 
     job: ClassVar[str] = "fogml.cli.blind_job:make_and_tell"
-    directory: Annotated[
-        str | None, argument("DIR", "The suite's folder.", writes=True, needed=_NO_SUITE)
-    ] = None
-    count: Annotated[int, option("Cases.", "--count", "-n")] = 1000
-    first: Annotated[int, option("Number of the first one.")] = 1
-    sample: Annotated[float, option("Interval.", metavar="SECONDS")] = 10.0
-    kinds: Annotated[
-        list[str],
-        option(
-            "Only cases of this kind; may be repeated.",
-            "--kind",
-            metavar="KIND",
-            known="fogml.blind.truth:KINDS",
-        ),
-    ] = []
-    least_d_prime: Annotated[float, option("Only strata of d' that begin there or above.", metavar="D")] = 0.0
-    d_prime: Annotated[
-        list[str],
-        option("Draw d' within these bounds instead; may be repeated.", metavar="LOW-HIGH"),
-    ] = []
-    reality: Annotated[
-        str,
-        option(
-            "first, second, third, mix for all in turn, or same-twin for a twin's own runs.",
-            metavar="NAME",
-            known=("first", "second", "third", "mix", "same-twin"),
-        ),
-    ] = "first"
-    leave_one_out: Annotated[
-        bool,
-        option("Only cases with an effect left out, each effect in turn.", "--leave-one-out"),
-    ] = False
-    relatives_stay: Annotated[
-        bool,
-        option(
-            "Keep relatives of an effect that is left out among the candidates.",
-            "--relatives-stay/--relatives-out",
-        ),
-    ] = False
+    directory: str | None = placed(None, "DIR", "The suite's folder.", writes=True, needed=_NO_SUITE)
+    count: int = setting(1000, "Cases.", "--count", "-n")
+    first: int = setting(1, "Number of the first one.")
+    sample: float = setting(10.0, "Interval.", metavar="SECONDS")
+    kinds: list[str] = setting(
+        [],
+        "Only cases of this kind; may be repeated.",
+        "--kind",
+        metavar="KIND",
+        known="fogml.blind.truth:KINDS",
+    )
+    least_d_prime: float = setting(0.0, "Only strata of d' that begin there or above.", metavar="D")
+    d_prime: list[str] = setting(
+        [], "Draw d' within these bounds instead; may be repeated.", metavar="LOW-HIGH"
+    )
+    reality: str = setting(
+        "first",
+        "first, second, third, mix for all in turn, or same-twin for a twin's own runs.",
+        metavar="NAME",
+        known=("first", "second", "third", "mix", "same-twin"),
+    )
+    leave_one_out: bool = setting(
+        False, "Only cases with an effect left out, each effect in turn.", "--leave-one-out"
+    )
+    relatives_stay: bool = setting(
+        False,
+        "Keep relatives of an effect that is left out among the candidates.",
+        "--relatives-stay/--relatives-out",
+    )
     workers: options.Workers = 2
 
     @property
@@ -121,24 +109,22 @@ class RunSettings(SuiteSettings):
     """Answer the cases that have no answer yet, in sealed processes that see a case's files alone."""
 
     job: ClassVar[str] = "fogml.cli.blind_job:run_and_tell"
-    methods: Annotated[
-        list[str],
-        option(
-            "diagnosis, a baseline, 'baselines', or module:function; repeatable.",
-            "--method",
-            metavar="NAME",
-            known="fogml.blind.methods:METHODS",
-        ),
-    ] = [DIAGNOSIS]
-    code: Annotated[
-        str | None, option("Where module:function lies.", metavar="FOLDER", reads=True, lost="no such folder")
-    ] = None
-    name: Annotated[str | None, option("What the answers are called.", metavar="NAME")] = None
+    methods: list[str] = setting(
+        [DIAGNOSIS],
+        "diagnosis, a baseline, 'baselines', or module:function; repeatable.",
+        "--method",
+        metavar="NAME",
+        known="fogml.blind.methods:METHODS",
+    )
+    code: str | None = setting(
+        None, "Where module:function lies.", metavar="FOLDER", reads=True, lost="no such folder"
+    )
+    name: str | None = setting(None, "What the answers are called.", metavar="NAME")
     workers: options.Workers = 2
-    threads: Annotated[int, option("Threads of each process.")] = 1
-    limit: Annotated[float, option("Time that a case may take.", metavar="SECONDS")] = 600.0
-    shard: Annotated[str, option("Every N-th case from the I-th on.", metavar="I/N")] = "1/1"
-    retry: Annotated[bool, option("Try failed cases again.", "--retry")] = False
+    threads: int = setting(1, "Threads of each process.")
+    limit: float = setting(600.0, "Time that a case may take.", metavar="SECONDS")
+    shard: str = setting("1/1", "Every N-th case from the I-th on.", metavar="I/N")
+    retry: bool = setting(False, "Try failed cases again.", "--retry")
     cost_of_false_name: options.CostOfFalseName = 1.0
 
     @property
@@ -166,10 +152,9 @@ class ScoreSettings(SuiteSettings):
     final: Final = False
     ledger: Ledger = LEDGER
     workers: options.Workers = 2
-    out: Annotated[
-        str | None,
-        option("Folder for what is written; the suite's if none.", "--out", "-o", metavar="DIR", writes=True),
-    ] = None
+    out: str | None = setting(
+        None, "Folder for what is written; the suite's if none.", "--out", "-o", metavar="DIR", writes=True
+    )
 
 
 class MergeSettings(Settings):
@@ -180,23 +165,20 @@ class MergeSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.blind_job:merge_and_write"
-    marks: Annotated[
-        list[str],
-        argument("MARKS...", "Files marks.json.gz of a suite's parts.", reads=True, lost="no such file"),
-    ] = []
+    marks: list[str] = placed(
+        [], "MARKS...", "Files marks.json.gz of a suite's parts.", reads=True, lost="no such file"
+    )
     final: Final = False
     ledger: Ledger = LEDGER
-    out: Annotated[
-        str | None,
-        option(
-            "Folder for the score.",
-            "--out",
-            "-o",
-            metavar="DIR",
-            writes=True,
-            needed="no --out is given; name a folder for the score",
-        ),
-    ] = None
+    out: str | None = setting(
+        None,
+        "Folder for the score.",
+        "--out",
+        "-o",
+        metavar="DIR",
+        writes=True,
+        needed="no --out is given; name a folder for the score",
+    )
 
 
 COMMANDS = {"make": MakeSettings, "run": RunSettings, "score": ScoreSettings, "merge": MergeSettings}

@@ -15,7 +15,7 @@ HELP_NAMES = {"help_option_names": ["-h", "--help"]}
 
 @dataclass(frozen=True)
 class Given:
-    """Words and ways of a setting, to stand in its annotation.
+    """Words and ways of a setting, to stand beside its default (`setting`, `placed`) or in its annotation.
 
     Attributes
     ----------
@@ -65,6 +65,10 @@ class Given:
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: Any) -> dict[str, Any]:
         """The setting's JSON schema, with its help."""
         return {**handler(core_schema), "description": self.help}
+
+    def __call__(self, schema: dict[str, Any]) -> None:
+        """Put the help into a schema, as pydantic asks of a field's own."""
+        schema["description"] = self.help
 
 
 def load(place: str) -> Any:

@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BeforeValidator, Field
 
 from fogml.cli import options
-from fogml.cli.given import argument, option
-from fogml.cli.settings import Settings
+from fogml.cli.given import option
+from fogml.cli.settings import Settings, placed, setting
 from fogml.errors import InputError
 
 WAYS = ("plain", "drift-observing", "palindrome", "coarse-fine")
@@ -34,23 +34,19 @@ class MisalignmentSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.lab_jobs:misalignment_and_write"
-    file: Annotated[
-        str | None,
-        argument(
-            "FILE",
-            "Table with state, tilt [deg], rate [deg/s], output [unit], and segment or time.",
-            reads=True,
-            needed="no file is given; name the table of turns and rests",
-            lost="no such file",
-        ),
-    ] = None
-    cross_tilt: Annotated[
-        bool | None,
-        option(
-            "Fit a constant over the tilts for a fixture tilted across (where the data show one).",
-            "--cross-tilt/--no-cross-tilt",
-        ),
-    ] = None
+    file: str | None = placed(
+        None,
+        "FILE",
+        "Table with state, tilt [deg], rate [deg/s], output [unit], and segment or time.",
+        reads=True,
+        needed="no file is given; name the table of turns and rests",
+        lost="no such file",
+    )
+    cross_tilt: bool | None = setting(
+        None,
+        "Fit a constant over the tilts for a fixture tilted across (where the data show one).",
+        "--cross-tilt/--no-cross-tilt",
+    )
     state_angles: Annotated[
         list[float] | None,
         options.numbers("0,180,270,90"),
@@ -72,42 +68,27 @@ class RateSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.lab_jobs:rate_and_write"
-    runs: Annotated[
-        list[str],
-        argument(
-            "[RUN...]",
-            "Runs on a rate table, with the column rate as commanded.",
-            reads=True,
-            known=options.SHIPPED_RUNS,
-        ),
-    ] = []
-    twin: Annotated[
-        str | None,
-        option(
-            "Test a twin in place of recorded runs.", metavar="NAME|FILE", reads=True, known=options.TWINS
-        ),
-    ] = None
-    greatest: Annotated[float, option("With --twin: greatest rate tested.", metavar="DEG/S")] = Field(
-        500.0, gt=0.0, le=1e4
+    runs: list[str] = placed(
+        [],
+        "[RUN...]",
+        "Runs on a rate table, with the column rate as commanded.",
+        reads=True,
+        known=options.SHIPPED_RUNS,
     )
-    noise: Annotated[
-        bool, option("With --twin: its noise too; else its effects alone.", "--noise/--no-noise")
-    ] = False
-    settle: Annotated[
-        float | None, option("Left out at the begin of each rate (2 samples).", metavar="SECONDS")
-    ] = Field(None, ge=0.0)
-    answers: Annotated[float, option("Share of the expected output that counts.", metavar="SHARE")] = Field(
-        0.5, gt=0.0, lt=1.0
+    twin: str | None = setting(
+        None, "Test a twin in place of recorded runs.", metavar="NAME|FILE", reads=True, known=options.TWINS
     )
-    dead: Annotated[float, option("Share of the expected change that is dead.", metavar="SHARE")] = Field(
-        0.1, gt=0.0, lt=1.0
+    greatest: float = setting(500.0, "With --twin: greatest rate tested.", metavar="DEG/S", gt=0.0, le=1e4)
+    noise: bool = setting(False, "With --twin: its noise too; else its effects alone.", "--noise/--no-noise")
+    settle: float | None = setting(
+        None, "Left out at the begin of each rate (2 samples).", metavar="SECONDS", ge=0.0
     )
-    range_error: Annotated[float, option("Deviation that ends the range.", metavar="SHARE")] = Field(
-        0.01, gt=0.0, lt=1.0
+    answers: float = setting(
+        0.5, "Share of the expected output that counts.", metavar="SHARE", gt=0.0, lt=1.0
     )
-    small: Annotated[float, option("Of the greatest rate: rates about zero.", metavar="SHARE")] = Field(
-        0.02, gt=0.0, le=1.0
-    )
+    dead: float = setting(0.1, "Share of the expected change that is dead.", metavar="SHARE", gt=0.0, lt=1.0)
+    range_error: float = setting(0.01, "Deviation that ends the range.", metavar="SHARE", gt=0.0, lt=1.0)
+    small: float = setting(0.02, "Of the greatest rate: rates about zero.", metavar="SHARE", gt=0.0, le=1.0)
     repair: options.Repair = False
     out: options.FolderIfNamed = None
 
@@ -126,53 +107,42 @@ class NorthSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.lab_jobs:north_and_write"
-    positions: Annotated[
-        str | None,
-        option(
-            "A run with a column position, 1 to 4, or the table's angle.",
-            metavar="FILE",
-            reads=True,
-            lost="no such file",
-        ),
-    ] = None
-    azimuth: Annotated[float | None, option("Simulate a seek at this azimuth.", metavar="DEG")] = None
-    latitude: Annotated[float | None, option("Latitude.", metavar="DEG")] = None
-    dwell: Annotated[float, option("In a position.", metavar="SECONDS")] = 60.0
-    transfer: Annotated[float, option("Time to the next position.", metavar="SECONDS")] = 0.0
-    drift: Annotated[float, option("Linear drift of the bias.", metavar="DEG/H/H")] = 0.0
+    positions: str | None = setting(
+        None,
+        "A run with a column position, 1 to 4, or the table's angle.",
+        metavar="FILE",
+        reads=True,
+        lost="no such file",
+    )
+    azimuth: float | None = setting(None, "Simulate a seek at this azimuth.", metavar="DEG")
+    latitude: float | None = setting(None, "Latitude.", metavar="DEG")
+    dwell: float = setting(60.0, "In a position.", metavar="SECONDS")
+    transfer: float = setting(0.0, "Time to the next position.", metavar="SECONDS")
+    drift: float = setting(0.0, "Linear drift of the bias.", metavar="DEG/H/H")
     transients: Annotated[
         list[Annotated[tuple[float, float], Field(strict=False)]],
         BeforeValidator(_transients),
         option("Exponential from power-on; may be repeated.", "--transient", metavar="DEG/H,SECONDS"),
     ] = []
-    start: Annotated[float, option("Begin of the seek after power-on.", metavar="SECONDS")] = 0.0
-    noise: Annotated[float, option("Angle random walk, for se.", metavar="DEG/SQRT(H)")] = 0.0
-    sense: Annotated[str, option("Way the positions are taken.", metavar="cw|ccw", known=("cw", "ccw"))] = (
-        "cw"
-    )
+    start: float = setting(0.0, "Begin of the seek after power-on.", metavar="SECONDS")
+    noise: float = setting(0.0, "Angle random walk, for se.", metavar="DEG/SQRT(H)")
+    sense: str = setting("cw", "Way the positions are taken.", metavar="cw|ccw", known=("cw", "ccw"))
     order: Annotated[
         list[float],
         options.numbers("0,90,180,270"),
         option("Angles of the positions.", metavar="DEG,...", as_text=True),
     ] = [0.0, 90.0, 180.0, 270.0]
-    way: Annotated[
-        str,
-        option(
-            "plain, drift-observing, palindrome, coarse-fine.",
-            metavar="NAME",
-            known=WAYS,
-        ),
-    ] = "plain"
-    method: Annotated[
-        str,
-        option(
-            "With --positions: auto, plain, drift-observing, bend-observing.",
-            metavar="NAME",
-            known="fogml.lab.north_positions:METHODS",
-        ),
-    ] = "auto"
-    settle: Annotated[float, option("With --positions: left out at each begin.", metavar="SECONDS")] = 0.0
-    coarse: Annotated[float, option("Time in a coarse position.", metavar="SECONDS")] = 6.0
+    way: str = setting(
+        "plain", "plain, drift-observing, palindrome, coarse-fine.", metavar="NAME", known=WAYS
+    )
+    method: str = setting(
+        "auto",
+        "With --positions: auto, plain, drift-observing, bend-observing.",
+        metavar="NAME",
+        known="fogml.lab.north_positions:METHODS",
+    )
+    settle: float = setting(0.0, "With --positions: left out at each begin.", metavar="SECONDS")
+    coarse: float = setting(6.0, "Time in a coarse position.", metavar="SECONDS")
     repair: options.Repair = False
     out: options.FolderIfNamed = None
 
@@ -192,29 +162,21 @@ class AcceptanceSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.lab_acceptance_job:acceptance_and_write"
-    runs: Annotated[
-        list[str],
-        argument("RUN...", "Runs of one unit and axis.", reads=True, known=options.SHIPPED_RUNS),
-    ] = []
-    model: Annotated[
-        str | None,
-        option("Folder of the unit's model.", metavar="DIR", reads=True, lost=options.LOST_MODEL),
-    ] = None
-    limits: Annotated[
-        str | None,
-        option("Limits (YAML): customer, document, limits.", metavar="FILE", reads=True, lost="no such file"),
-    ] = None
-    noise: Annotated[
-        str | None,
-        option(
-            "Static run for noise terms and floor.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
-        ),
-    ] = None
-    averaging: options.Averaging = Field(100.0, gt=0.0)
-    turn_on_band: Annotated[float | None, option("Band that tells the turn-on time.", metavar="DEG/H")] = (
-        Field(None, gt=0.0)
+    runs: list[str] = placed(
+        [], "RUN...", "Runs of one unit and axis.", reads=True, known=options.SHIPPED_RUNS
     )
-    date: Annotated[str | None, option("Date of issue; a line to write it on if none.")] = None
+    model: str | None = setting(
+        None, "Folder of the unit's model.", metavar="DIR", reads=True, lost=options.LOST_MODEL
+    )
+    limits: str | None = setting(
+        None, "Limits (YAML): customer, document, limits.", metavar="FILE", reads=True, lost="no such file"
+    )
+    noise: str | None = setting(
+        None, "Static run for noise terms and floor.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
+    )
+    averaging: options.Averaging = Field(100.0, gt=0.0)
+    turn_on_band: float | None = setting(None, "Band that tells the turn-on time.", metavar="DEG/H", gt=0.0)
+    date: str | None = setting(None, "Date of issue; a line to write it on if none.")
     axis: options.Axis = None
     repair: options.Repair = False
     out: options.FolderIfNamed = None
@@ -228,17 +190,15 @@ class BatchSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.lab_acceptance_job:batch_and_write"
-    reports: Annotated[
-        list[str],
-        argument(
-            "REPORT...",
-            "Files acceptance.json, or the folders that hold them.",
-            reads=True,
-            needed="no report is given; name files acceptance.json, or the folders that hold them",
-            lost="no such file; name acceptance reports (acceptance.json) or their folders",
-        ),
-    ] = []
-    title: Annotated[str, option("Heading of the page.")] = "Batch"
+    reports: list[str] = placed(
+        [],
+        "REPORT...",
+        "Files acceptance.json, or the folders that hold them.",
+        reads=True,
+        needed="no report is given; name files acceptance.json, or the folders that hold them",
+        lost="no such file; name acceptance reports (acceptance.json) or their folders",
+    )
+    title: str = setting("Batch", "Heading of the page.")
     out: options.FolderIfNamed = None
 
 

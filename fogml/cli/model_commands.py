@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError
 
 from fogml.cli import options
 from fogml.cli.given import argument, option
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Settings, placed, setting
 from fogml.errors import known_are, quoted
 from fogml.strict import first_fault
 from fogml.tracking import shown_tracker
@@ -28,34 +28,28 @@ class TrainSettings(options.LimitSettings):
     model: options.Model = "auto"
     features: options.Features = None
     parameters: options.Parameters = {}
-    train_again: Annotated[
-        bool,
-        option(
-            "Search sizes and features on training folds until the design index is met there.",
-            "--train-again/--train-once",
-        ),
-    ] = False
-    from_diagnosis: Annotated[
-        str | None,
-        option(
-            "Compensate the causes that a diagnosis named: its folder; 'auto' is judged beside it.",
-            metavar="DIR",
-            reads=True,
-            lost="no such folder; name the one that 'fogml diagnose' wrote",
-        ),
-    ] = None
-    causes: Annotated[
-        list[str],
-        option(
-            "With --from-diagnosis these causes in place of those named; may be repeated.",
-            "--cause",
-            metavar="EFFECT",
-            known=options.EFFECTS,
-        ),
-    ] = []
-    navigation: Annotated[
-        float | None, option("Show what the drift costs a navigator there.", metavar="LATITUDE")
-    ] = None
+    train_again: bool = setting(
+        False,
+        "Search sizes and features on training folds until the design index is met there.",
+        "--train-again/--train-once",
+    )
+    from_diagnosis: str | None = setting(
+        None,
+        "Compensate the causes that a diagnosis named: its folder; 'auto' is judged beside it.",
+        metavar="DIR",
+        reads=True,
+        lost="no such folder; name the one that 'fogml diagnose' wrote",
+    )
+    causes: list[str] = setting(
+        [],
+        "With --from-diagnosis these causes in place of those named; may be repeated.",
+        "--cause",
+        metavar="EFFECT",
+        known=options.EFFECTS,
+    )
+    navigation: float | None = setting(
+        None, "Show what the drift costs a navigator there.", metavar="LATITUDE"
+    )
     axis: options.Axis = None
     repair: options.Repair = False
     strict: options.Strict = False
@@ -74,10 +68,9 @@ class CompareSettings(options.LimitSettings):
     job: ClassVar[str] = "fogml.cli.compare_job:compare_and_write"
     runs: options.Runs = []
     test: options.TestsIfAny = []
-    leave_one_out: Annotated[
-        bool,
-        option("Without --test: judge each run by models fitted on the others.", "--leave-one-out/--split"),
-    ] = False
+    leave_one_out: bool = setting(
+        False, "Without --test: judge each run by models fitted on the others.", "--leave-one-out/--split"
+    )
     models: Annotated[
         list[str],
         BeforeValidator(options.names_list),
@@ -105,26 +98,22 @@ class CompensateSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.model_jobs:compensate_and_write"
-    run: Annotated[
-        str | None,
-        argument(
-            "RUN",
-            "The run to compensate.",
-            reads=True,
-            known=options.SHIPPED_RUNS,
-            needed="no run is given; name the run to compensate",
-        ),
-    ] = None
-    model: Annotated[
-        str | None,
-        option(
-            "Folder of the model, or of the results that hold it.",
-            metavar="DIR",
-            reads=True,
-            needed="no --model is given; name the folder of the model, e.g. train-results/model",
-            lost=options.LOST_MODEL,
-        ),
-    ] = None
+    run: str | None = placed(
+        None,
+        "RUN",
+        "The run to compensate.",
+        reads=True,
+        known=options.SHIPPED_RUNS,
+        needed="no run is given; name the run to compensate",
+    )
+    model: str | None = setting(
+        None,
+        "Folder of the model, or of the results that hold it.",
+        metavar="DIR",
+        reads=True,
+        needed="no --model is given; name the folder of the model, e.g. train-results/model",
+        lost=options.LOST_MODEL,
+    )
     any_unit: options.AnyUnit = False
     axis: options.Axis = None
     repair: options.Repair = False
@@ -163,54 +152,42 @@ class ExportJobSettings(Settings):
             lost=options.LOST_MODEL,
         ),
     ] = []
-    to: Annotated[
-        str,
-        option(
-            "c, onnx, json, mat; segments, px4 or ardupilot.",
-            metavar="FORMAT",
-            known=("c", "onnx", "json", "mat", "segments", "px4", "ardupilot"),
-        ),
-    ] = "c"
-    dtype: Annotated[
-        str | None,
-        option(
-            "float64, float32, float16, int8, q15 or q31.",
-            metavar="TYPE",
-            known=("float64", "float32", "float16", "int8", "q15", "q31"),
-        ),
-    ] = None
-    bytes: Annotated[int | None, option("Leave out centres until the weights fit N bytes.")] = None
-    with_pipeline: Annotated[
-        bool, option("ONNX from the temperatures' window.", "--with-pipeline/--features-only")
-    ] = False
-    tolerance: Annotated[
-        float | None, option("Largest difference from the model allowed.", metavar="DEG/H")
-    ] = None
-    sample_s: Annotated[
-        float | None, option("Sample interval on board; that of training if none.", metavar="SECONDS")
-    ] = None
-    breakpoints: Annotated[
-        int | None, option("Of segments; as few as the tolerance allows.", metavar="K")
-    ] = None
-    matrix: Annotated[
-        str | None,
-        option(
-            "3 x 3 matrix (YAML) that three axes are multiplied by.",
-            metavar="FILE",
-            reads=True,
-            lost="no such file",
-        ),
-    ] = None
-    train: Annotated[
-        list[str],
-        option(
-            "The model's training runs, to prune and to judge on.",
-            metavar="RUN...",
-            spread=True,
-            reads=True,
-            known=options.SHIPPED_RUNS,
-        ),
-    ] = []
+    to: str = setting(
+        "c",
+        "c, onnx, json, mat; segments, px4 or ardupilot.",
+        metavar="FORMAT",
+        known=("c", "onnx", "json", "mat", "segments", "px4", "ardupilot"),
+    )
+    dtype: str | None = setting(
+        None,
+        "float64, float32, float16, int8, q15 or q31.",
+        metavar="TYPE",
+        known=("float64", "float32", "float16", "int8", "q15", "q31"),
+    )
+    bytes: int | None = setting(None, "Leave out centres until the weights fit N bytes.")
+    with_pipeline: bool = setting(
+        False, "ONNX from the temperatures' window.", "--with-pipeline/--features-only"
+    )
+    tolerance: float | None = setting(None, "Largest difference from the model allowed.", metavar="DEG/H")
+    sample_s: float | None = setting(
+        None, "Sample interval on board; that of training if none.", metavar="SECONDS"
+    )
+    breakpoints: int | None = setting(None, "Of segments; as few as the tolerance allows.", metavar="K")
+    matrix: str | None = setting(
+        None,
+        "3 x 3 matrix (YAML) that three axes are multiplied by.",
+        metavar="FILE",
+        reads=True,
+        lost="no such file",
+    )
+    train: list[str] = setting(
+        [],
+        "The model's training runs, to prune and to judge on.",
+        metavar="RUN...",
+        spread=True,
+        reads=True,
+        known=options.SHIPPED_RUNS,
+    )
     out: options.Folder = "export-results"
 
 
@@ -242,30 +219,28 @@ class SweepSettings(Settings):
     job: ClassVar[str] = "fogml.cli.sweep_job:sweep_and_write"
     config_argument: ClassVar[str] = "YAML file of schema fogml.sweep/1."
     schema_: Literal["fogml.sweep/1"] = Field("fogml.sweep/1", alias="schema")
-    name: Annotated[str, option("Name of the study in its storage.", metavar="NAME")] = "sweep"
-    runs: Annotated[
-        list[str],
-        option(
-            "Training run; may be repeated.",
-            "--run",
-            metavar="RUN",
-            reads=True,
-            known=options.SHIPPED_RUNS,
-            needed="no training run is given; state 'runs' in the file, or --run",
-        ),
-    ] = []
+    name: str = setting("sweep", "Name of the study in its storage.", metavar="NAME")
+    runs: list[str] = setting(
+        [],
+        "Training run; may be repeated.",
+        "--run",
+        metavar="RUN",
+        reads=True,
+        known=options.SHIPPED_RUNS,
+        needed="no training run is given; state 'runs' in the file, or --run",
+    )
     test: options.TestsIfAny = []
     space: Annotated[Space, BeforeValidator(_understood)]
     objectives: Annotated[list[str], BeforeValidator(options.names_list)] = ["rms"]
     folds: Literal["auto", "time", "runs"] = "auto"
     fold_count: int = 5
-    trials: Annotated[int, option("Trials to finish.")] = 50
+    trials: int = setting(50, "Trials to finish.")
     sampler: str = "tpe"
     prune: bool = True
     workers: options.Workers = 1
-    storage: Annotated[
-        str | None, option("Database of the study, e.g. postgresql://user@host/db.", metavar="URL")
-    ] = None
+    storage: str | None = setting(
+        None, "Database of the study, e.g. postgresql://user@host/db.", metavar="URL"
+    )
     heartbeat_s: float = 10.0
     track: options.Track = None
     averaging: options.Averaging = 100.0

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, field_validator
 
 from fogml.cli.given import argument, option
-from fogml.cli.settings import SHIPPED_RUNS, Settings
+from fogml.cli.settings import SHIPPED_RUNS, Settings, setting
 from fogml.errors import quoted
 from fogml.yaml_text import parse_yaml
 
@@ -156,26 +156,20 @@ class LimitSettings(Settings):
     """Settings of a command that judges."""
 
     averaging: Averaging = 100.0
-    design_index: Annotated[
-        float | None, option("Greatest rms allowed after compensation.", metavar="DEG/H")
-    ] = None
-    limits: Annotated[dict[str, float], option("Limit on another figure; may be repeated.", "--limit")] = {}
-    turn_on_band: Annotated[
-        float | None,
-        option(
-            "Tell the time from power-on until the bias stays this near to its settled value.",
-            metavar="DEG/H",
-        ),
-    ] = None
-    noise: Annotated[
-        str | None,
-        option(
-            "Static run of the unit: its noise makes the floor.",
-            metavar="RUN",
-            reads=True,
-            known=SHIPPED_RUNS,
-        ),
-    ] = None
+    design_index: float | None = setting(None, "Greatest rms allowed after compensation.", metavar="DEG/H")
+    limits: dict[str, float] = setting({}, "Limit on another figure; may be repeated.", "--limit")
+    turn_on_band: float | None = setting(
+        None,
+        "Tell the time from power-on until the bias stays this near to its settled value.",
+        metavar="DEG/H",
+    )
+    noise: str | None = setting(
+        None,
+        "Static run of the unit: its noise makes the floor.",
+        metavar="RUN",
+        reads=True,
+        known=SHIPPED_RUNS,
+    )
 
     @field_validator("limits", mode="before")
     @classmethod

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 from pydantic import Field
 
 from fogml.cli import options
-from fogml.cli.given import argument, option
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Settings, placed, setting
 from fogml.fleet import FORM
 from fogml.tracking import shown_tracker
 
@@ -32,33 +31,27 @@ class ImportSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.run_jobs:import_and_write"
-    file: Annotated[
-        str | None,
-        argument(
-            "FILE",
-            "The logger's file.",
-            reads=True,
-            needed="no file is given; name the logger's file",
-            lost="no such file",
-        ),
-    ] = None
-    profile: Annotated[
-        str | None,
-        option(
-            "Name of a profile that ships, or a YAML file.",
-            metavar="NAME|FILE",
-            reads=True,
-            known="fogml.runs.profile_schema:profile_names",
-        ),
-    ] = None
-    axis: Annotated[str | None, option("One axis of the profile; all if none.", metavar="AXIS")] = None
-    draft: Annotated[
-        bool,
-        option(
-            "Write a profile with guesses into the file that --out names, or print it; show the first rows "
-            "as it reads them."
-        ),
-    ] = False
+    file: str | None = placed(
+        None,
+        "FILE",
+        "The logger's file.",
+        reads=True,
+        needed="no file is given; name the logger's file",
+        lost="no such file",
+    )
+    profile: str | None = setting(
+        None,
+        "Name of a profile that ships, or a YAML file.",
+        metavar="NAME|FILE",
+        reads=True,
+        known="fogml.runs.profile_schema:profile_names",
+    )
+    axis: str | None = setting(None, "One axis of the profile; all if none.", metavar="AXIS")
+    draft: bool = setting(
+        False,
+        "Write a profile with guesses into the file that --out names, or print it; show the first rows "
+        "as it reads them.",
+    )
     repair: options.Repair = False
     out: options.FolderIfNamed = None
 
@@ -70,16 +63,14 @@ class InspectSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.run_jobs:inspect_and_write"
-    runs: Annotated[
-        list[str],
-        argument(
-            "RUN...",
-            "Runs to look into.",
-            reads=True,
-            known=options.SHIPPED_RUNS,
-            needed="no run is given; name at least one",
-        ),
-    ] = []
+    runs: list[str] = placed(
+        [],
+        "RUN...",
+        "Runs to look into.",
+        reads=True,
+        known=options.SHIPPED_RUNS,
+        needed="no run is given; name at least one",
+    )
     axis: options.Axis = None
     repair: options.Repair = False
     strict: options.Strict = False
@@ -94,25 +85,21 @@ class NoiseSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.run_jobs:noise_and_write"
-    run: Annotated[
-        str | list[str] | None,
-        argument(
-            "RUN...",
-            "A run, best at constant temperature; several share their terms.",
-            reads=True,
-            known=options.SHIPPED_RUNS,
-            needed="no run is given; name one",
-        ),
-    ] = None
-    overlapping: Annotated[bool, option("Kind of estimator.", "--overlapping/--not-overlapping")] = True
-    to: Annotated[
-        str | None,
-        option(
-            "Write the terms for another program.",
-            metavar="kalibr|matlab|kalman",
-            known="fogml.export.noise_parameters:TARGETS",
-        ),
-    ] = None
+    run: str | list[str] | None = placed(
+        None,
+        "RUN...",
+        "A run, best at constant temperature; several share their terms.",
+        reads=True,
+        known=options.SHIPPED_RUNS,
+        needed="no run is given; name one",
+    )
+    overlapping: bool = setting(True, "Kind of estimator.", "--overlapping/--not-overlapping")
+    to: str | None = setting(
+        None,
+        "Write the terms for another program.",
+        metavar="kalibr|matlab|kalman",
+        known="fogml.export.noise_parameters:TARGETS",
+    )
     axis: options.Axis = None
     repair: options.Repair = False
     out: options.FolderIfNamed = None
@@ -127,15 +114,17 @@ class AppSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.app_job:serve"
-    folder: Annotated[str, argument("[FOLDER]", "Where files and jobs lie.", writes=True)] = "fogml-app"
-    port: Annotated[int, option("Port of the address; 0 for any that is free.")] = Field(8765, ge=0, le=65535)
-    jobs: Annotated[int, option("Jobs that run at a time; others wait.")] = Field(1, ge=1)
-    upload_limit: Annotated[float, option("Greatest size of a file.", metavar="MB")] = Field(2000.0, gt=0.0)
-    idle: Annotated[
-        float | None,
-        option("End once no page has asked for so long and no job runs; never if none.", metavar="SECONDS"),
-    ] = Field(None, gt=0.0)
-    browser: Annotated[bool, option("Open the page in the browser.", "--browser/--no-browser")] = False
+    folder: str = placed("fogml-app", "[FOLDER]", "Where files and jobs lie.", writes=True)
+    port: int = setting(8765, "Port of the address; 0 for any that is free.", ge=0, le=65535)
+    jobs: int = setting(1, "Jobs that run at a time; others wait.", ge=1)
+    upload_limit: float = setting(2000.0, "Greatest size of a file.", metavar="MB", gt=0.0)
+    idle: float | None = setting(
+        None,
+        "End once no page has asked for so long and no job runs; never if none.",
+        metavar="SECONDS",
+        gt=0.0,
+    )
+    browser: bool = setting(False, "Open the page in the browser.", "--browser/--no-browser")
 
 
 class DocsSettings(Settings):
@@ -146,12 +135,8 @@ class DocsSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.docs_job:show_docs"
-    page: Annotated[
-        str | None, argument("[PAGE]", "A page to print here.", known="fogml.cli.docs_job:page_names")
-    ] = None
-    out: Annotated[
-        str | None, option("File to write: .html.", "--out", "-o", metavar="FILE", writes=True)
-    ] = None
+    page: str | None = placed(None, "[PAGE]", "A page to print here.", known="fogml.cli.docs_job:page_names")
+    out: str | None = setting(None, "File to write: .html.", "--out", "-o", metavar="FILE", writes=True)
 
 
 class FleetSettings(options.LimitSettings):
@@ -163,53 +148,40 @@ class FleetSettings(options.LimitSettings):
     """
 
     job: ClassVar[str] = "fogml.cli.fleet_job:fleet_and_write"
-    manifest: Annotated[
-        str | None,
-        argument(
-            "MANIFEST",
-            "CSV or YAML of units: unit, job, train, test, axis.",
-            reads=True,
-            needed="no manifest is given; name a CSV or YAML file of units",
-            lost="no such file; a manifest was expected, CSV or YAML",
-        ),
-    ] = None
+    manifest: str | None = placed(
+        None,
+        "MANIFEST",
+        "CSV or YAML of units: unit, job, train, test, axis.",
+        reads=True,
+        needed="no manifest is given; name a CSV or YAML file of units",
+        lost="no such file; a manifest was expected, CSV or YAML",
+    )
     model: options.Model = "auto"
     features: options.Features = None
     parameters: options.Parameters = {}
     models: list[str] = ["all"]
-    form: Annotated[
-        str, option("Features that the units' constants are compared in.", metavar="FEATURES")
-    ] = FORM
-    prior: Annotated[
-        str | None,
-        option(
-            "Draw constants to those of an earlier fleet.",
-            metavar="FLEET.JSON",
-            reads=True,
-            lost="no such file; a fleet.json was expected",
-        ),
-    ] = None
-    acceptance_limits: Annotated[
-        str | None,
-        option(
-            "Limits of acceptance reports (YAML), as of 'lab acceptance'.",
-            metavar="FILE",
-            reads=True,
-            lost="no such file",
-        ),
-    ] = None
+    form: str = setting(FORM, "Features that the units' constants are compared in.", metavar="FEATURES")
+    prior: str | None = setting(
+        None,
+        "Draw constants to those of an earlier fleet.",
+        metavar="FLEET.JSON",
+        reads=True,
+        lost="no such file; a fleet.json was expected",
+    )
+    acceptance_limits: str | None = setting(
+        None,
+        "Limits of acceptance reports (YAML), as of 'lab acceptance'.",
+        metavar="FILE",
+        reads=True,
+        lost="no such file",
+    )
     twin: options.Twin = "nominal"
     next_run: options.NextRun = True
     workers: options.Workers = 1
-    cluster: Annotated[str | None, option("Scheduler of a Dask cluster.", metavar="tcp://HOST:PORT")] = None
-    device: Annotated[
-        str | None,
-        option(
-            "Train the units' RBF networks there: cpu, cuda.",
-            metavar="DEVICE",
-            known=("cpu", "cuda"),
-        ),
-    ] = None
+    cluster: str | None = setting(None, "Scheduler of a Dask cluster.", metavar="tcp://HOST:PORT")
+    device: str | None = setting(
+        None, "Train the units' RBF networks there: cpu, cuda.", metavar="DEVICE", known=("cpu", "cuda")
+    )
     track: options.Track = None
     repair: options.Repair = False
     strict: options.Strict = False
@@ -240,45 +212,36 @@ class MonitorSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.monitor_job:monitor_and_write"
-    model: Annotated[
-        str | None,
-        argument(
-            "MODEL",
-            "Folder of the model, or of a fleet's results with a model per unit.",
-            reads=True,
-            needed="no model is given; name its folder, or that of a fleet's results",
-            lost=options.LOST_MODEL,
-        ),
-    ] = None
-    runs: Annotated[
-        list[str],
-        argument("[RUN...]", "Runs that are new; none for those of the store.", reads=True),
-    ] = []
-    store: Annotated[
-        str | None,
-        option(
-            "Where runs are kept: a folder, or postgresql://user@host/db (DIR/store).",
-            metavar="FOLDER|URL",
-        ),
-    ] = None
-    false_alarm_every: Annotated[
-        float, option("Least mean number of a unit's runs until a false alarm.", metavar="RUNS")
-    ] = Field(1000.0, ge=1.0)
-    wander: Annotated[
-        bool,
-        option(
-            "Take a bias that wanders as flicker for no change; without, smaller steps are found, and "
-            "wandering raises alarms.",
-            "--wander/--no-wander",
-        ),
-    ] = True
-    bias_limit: Annotated[
-        float | None,
-        option("Change of the bias that asks for a calibration (the model's interval).", metavar="DEG/H"),
-    ] = Field(None, gt=0.0)
-    patience: Annotated[
-        float, option("How long to wait for a store that is away or busy.", metavar="SECONDS")
-    ] = Field(60.0, ge=0.0)
+    model: str | None = placed(
+        None,
+        "MODEL",
+        "Folder of the model, or of a fleet's results with a model per unit.",
+        reads=True,
+        needed="no model is given; name its folder, or that of a fleet's results",
+        lost=options.LOST_MODEL,
+    )
+    runs: list[str] = placed([], "[RUN...]", "Runs that are new; none for those of the store.", reads=True)
+    store: str | None = setting(
+        None, "Where runs are kept: a folder, or postgresql://user@host/db (DIR/store).", metavar="FOLDER|URL"
+    )
+    false_alarm_every: float = setting(
+        1000.0, "Least mean number of a unit's runs until a false alarm.", metavar="RUNS", ge=1.0
+    )
+    wander: bool = setting(
+        True,
+        "Take a bias that wanders as flicker for no change; without, smaller steps are found, and "
+        "wandering raises alarms.",
+        "--wander/--no-wander",
+    )
+    bias_limit: float | None = setting(
+        None,
+        "Change of the bias that asks for a calibration (the model's interval).",
+        metavar="DEG/H",
+        gt=0.0,
+    )
+    patience: float = setting(
+        60.0, "How long to wait for a store that is away or busy.", metavar="SECONDS", ge=0.0
+    )
     averaging: options.Averaging = Field(100.0, gt=0.0)
     any_unit: options.AnyUnit = False
     repair: options.Repair = False

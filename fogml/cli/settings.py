@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from inspect import get_annotations
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from fogml import __version__
-from fogml.cli.given import Given, option
+from fogml.cli.given import Given, argument, option
 from fogml.errors import InputError, known_are, listed, printable, quoted
 from fogml.folders import not_there, with_slashes
 from fogml.locks import sole_writer
@@ -24,6 +24,17 @@ SHIPPED = "shipped:"
 """What a run's path begins with when it names a recording that ships."""
 SHIPPED_RUNS = "fogml.cli.runs:shipped_places"
 """Where the names of recordings that ship are; a run of another name is a file."""
+
+
+def setting(default: Any, help: str, *names: str, **more: Any) -> Any:
+    """A setting's default, and how an option gives it; `more` as of `Given`, and bounds as of `Field`."""
+    bounds = {key: more.pop(key) for key in ("gt", "ge", "lt", "le") if key in more}
+    return Field(default, json_schema_extra=option(help, *names, **more), **bounds)
+
+
+def placed(default: Any, metavar: str, help: str, **more: Any) -> Any:
+    """A setting's default, and how its place on the command line gives it; `more` as of `Given`."""
+    return Field(default, json_schema_extra=argument(metavar, help, **more))
 
 
 class Settings(Strict):
@@ -40,7 +51,7 @@ class Settings(Strict):
     """Settings that name files to read."""
     written_keys: ClassVar[tuple[str, ...]] = ()
     """Settings that name files or folders to write."""
-    seed: Annotated[int, option("Seed of everything random.")] = Field(0, ge=0, lt=1 << 32)
+    seed: int = setting(0, "Seed of everything random.", ge=0, lt=1 << 32)
 
     @classmethod
     def __pydantic_init_subclass__(cls, **more: Any) -> None:
@@ -147,7 +158,8 @@ def given_settings(settings: type[Settings]) -> dict[str, Given]:
     """How settings stand on a command line, by name: a class's own first, then what it shares."""
     fields = settings.model_fields
     names = [name for cls in settings.__mro__ for name in get_annotations(cls) if name in fields]
-    return {name: given for name in names for given in fields[name].metadata if isinstance(given, Given)}
+    held = {name: (*fields[name].metadata, fields[name].json_schema_extra) for name in names}
+    return {name: given for name in names for given in held[name] if isinstance(given, Given)}
 
 
 def config_file(command: str) -> str:

@@ -10,8 +10,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
 
 from fogml.cli import options
-from fogml.cli.given import argument, load, option
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.given import load, option
+from fogml.cli.settings import Settings, absolute, placed, setting
 
 
 class EffectsSettings(Settings):
@@ -22,7 +22,7 @@ class EffectsSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.effects_job:show_effects"
-    effect: Annotated[str | None, argument("[ID]", "An effect; all if none.", known=options.EFFECTS)] = None
+    effect: str | None = placed(None, "[ID]", "An effect; all if none.", known=options.EFFECTS)
     out: options.FolderIfNamed = None
 
 
@@ -35,49 +35,41 @@ class ReplaySettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.twin_jobs:replay_and_write"
-    twin: Annotated[
-        str | None,
-        argument(
-            "TWIN",
-            "A twin file or name, or a simulator's output.",
-            reads=True,
-            known=options.TWINS,
-            needed="no twin is given; name a file, or one that ships, e.g. tactical",
-        ),
-    ] = None
-    run: Annotated[
-        str | None,
-        argument(
-            "RUN",
-            "The run whose inputs to take.",
-            reads=True,
-            known=options.SHIPPED_RUNS,
-            needed="no run is given; name the run to replay",
-        ),
-    ] = None
-    only: Annotated[
-        str | None,
-        option("The difference that one effect makes.", metavar="EFFECT", known=options.EFFECTS),
-    ] = None
-    truth: Annotated[
-        str | None,
-        option("Truth of a simulated run, in place of its columns.", metavar="FILE", reads=True),
-    ] = None
-    gyro_axis: Annotated[
-        str | None,
-        option(
-            "Of gnss-ins-sim's axes the gyro's; -z where it points the other way.", "--axis", metavar="x|y|z"
-        ),
-    ] = None
-    after: Annotated[
-        list[str],
-        option(
-            "The unit's run before, whose memory goes on; may be repeated. Each states 'started'.",
-            metavar="RUN",
-            reads=True,
-        ),
-    ] = []
-    storage_temperature: Annotated[float, option("Where the unit was between runs.", metavar="DEGC")] = 25.0
+    twin: str | None = placed(
+        None,
+        "TWIN",
+        "A twin file or name, or a simulator's output.",
+        reads=True,
+        known=options.TWINS,
+        needed="no twin is given; name a file, or one that ships, e.g. tactical",
+    )
+    run: str | None = placed(
+        None,
+        "RUN",
+        "The run whose inputs to take.",
+        reads=True,
+        known=options.SHIPPED_RUNS,
+        needed="no run is given; name the run to replay",
+    )
+    only: str | None = setting(
+        None, "The difference that one effect makes.", metavar="EFFECT", known=options.EFFECTS
+    )
+    truth: str | None = setting(
+        None, "Truth of a simulated run, in place of its columns.", metavar="FILE", reads=True
+    )
+    gyro_axis: str | None = setting(
+        None,
+        "Of gnss-ins-sim's axes the gyro's; -z where it points the other way.",
+        "--axis",
+        metavar="x|y|z",
+    )
+    after: list[str] = setting(
+        [],
+        "The unit's run before, whose memory goes on; may be repeated. Each states 'started'.",
+        metavar="RUN",
+        reads=True,
+    )
+    storage_temperature: float = setting(25.0, "Where the unit was between runs.", metavar="DEGC")
     repair: options.Repair = False
     out: options.FileToWrite = None
 
@@ -93,41 +85,31 @@ class DiagnoseSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.diagnose_job:diagnose_and_write"
-    runs: Annotated[
-        list[str],
-        argument(
-            "RUN...",
-            "Runs to fit on.",
-            reads=True,
-            known=options.SHIPPED_RUNS,
-            needed="no run is given; name the runs to diagnose before --held-out",
-        ),
-    ] = []
-    held_out: Annotated[
-        list[str],
-        option(
-            "Run for the final figure; may be repeated.",
-            metavar="RUN",
-            reads=True,
-            known=options.SHIPPED_RUNS,
-        ),
-    ] = []
-    noise: Annotated[
-        str | None,
-        option(
-            "Static run of the unit, for its noise.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
-        ),
-    ] = None
+    runs: list[str] = placed(
+        [],
+        "RUN...",
+        "Runs to fit on.",
+        reads=True,
+        known=options.SHIPPED_RUNS,
+        needed="no run is given; name the runs to diagnose before --held-out",
+    )
+    held_out: list[str] = setting(
+        [],
+        "Run for the final figure; may be repeated.",
+        metavar="RUN",
+        reads=True,
+        known=options.SHIPPED_RUNS,
+    )
+    noise: str | None = setting(
+        None, "Static run of the unit, for its noise.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
+    )
     twin: options.Twin = "nominal"
-    without: Annotated[
-        list[str],
-        option("Effect that is no candidate; may be repeated.", metavar="EFFECT", known=options.EFFECTS),
-    ] = []
+    without: list[str] = setting(
+        [], "Effect that is no candidate; may be repeated.", metavar="EFFECT", known=options.EFFECTS
+    )
     cost_of_false_name: options.CostOfFalseName = 1.0
     next_run: options.NextRun = True
-    rehearse: Annotated[bool, option("Tell what these runs would name of each candidate.", "--rehearse")] = (
-        False
-    )
+    rehearse: bool = setting(False, "Tell what these runs would name of each candidate.", "--rehearse")
     repair: options.Repair = False
     out: options.Folder = "diagnosis"
 
@@ -155,14 +137,12 @@ class PlanSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.plan_job:plan_and_write"
-    want: Annotated[
-        list[str],
-        option(
-            "Effect, nominal constant (k1), or EFFECT.PARAMETER to be known; may be repeated.",
-            metavar="EFFECT|CONSTANT",
-            known=options.EFFECTS,
-        ),
-    ] = []
+    want: list[str] = setting(
+        [],
+        "Effect, nominal constant (k1), or EFFECT.PARAMETER to be known; may be repeated.",
+        metavar="EFFECT|CONSTANT",
+        known=options.EFFECTS,
+    )
     separate: Annotated[
         list[list[str]],
         BeforeValidator(_groups),
@@ -172,7 +152,7 @@ class PlanSettings(Settings):
             known=options.EFFECTS,
         ),
     ] = []
-    hours: Annotated[float, option("Longest time of a run.", metavar="HOURS")] = 24.0
+    hours: float = setting(24.0, "Longest time of a run.", metavar="HOURS")
     criterion: Annotated[
         str,
         BeforeValidator(_capital),
@@ -182,19 +162,19 @@ class PlanSettings(Settings):
             known=("D", "A"),
         ),
     ] = "D"
-    runs: Annotated[int, option("How many runs, planned in turn.")] = 1
+    runs: int = setting(1, "How many runs, planned in turn.")
     twin: options.Twin = "nominal"
-    coldest: Annotated[float, option("Lowest temperature.", metavar="DEGC")] = -40.0
-    hottest: Annotated[float, option("Highest temperature.", metavar="DEGC")] = 60.0
-    input_axis: Annotated[
-        str | None, option("up, down, north ...: the mounting; up or north is tried else.", metavar="WAY")
-    ] = None
+    coldest: float = setting(-40.0, "Lowest temperature.", metavar="DEGC")
+    hottest: float = setting(60.0, "Highest temperature.", metavar="DEGC")
+    input_axis: str | None = setting(
+        None, "up, down, north ...: the mounting; up or north is tried else.", metavar="WAY"
+    )
     latitude: Annotated[float, option("Of the lab (39.9).", metavar="DEG")] = Field(
         default_factory=_usual_latitude
     )
-    power_steps: Annotated[
-        bool, option("Whether the unit's power may be switched.", "--power-steps/--no-power-steps")
-    ] = True
+    power_steps: bool = setting(
+        True, "Whether the unit's power may be switched.", "--power-steps/--no-power-steps"
+    )
     out: options.Folder = "plan"
 
 
@@ -246,14 +226,13 @@ class SimulateSettings(Settings):
     job: ClassVar[str] = "fogml.cli.twin_jobs:simulate_and_write"
     config_argument: ClassVar[str] = "YAML file of schema fogml.simulate/1."
     schema_: Literal["fogml.simulate/1"] = Field("fogml.simulate/1", alias="schema")
-    sample_s: Annotated[float, option("Sample interval.", "--sample", metavar="SECONDS")] = 1.0
-    programme: Annotated[
-        str | list[Any] | dict[str, Any] | None,
-        option("Chamber and table programme.", metavar="NAME|FILE", reads=True, known=PROGRAMMES),
-    ] = None
-    twin: Annotated[
-        str | dict[str, Any], option("The twin.", metavar="NAME|FILE", reads=True, known=options.TWINS)
-    ] = "nominal"
+    sample_s: float = setting(1.0, "Sample interval.", "--sample", metavar="SECONDS")
+    programme: str | list[Any] | dict[str, Any] | None = setting(
+        None, "Chamber and table programme.", metavar="NAME|FILE", reads=True, known=PROGRAMMES
+    )
+    twin: str | dict[str, Any] = setting(
+        "nominal", "The twin.", metavar="NAME|FILE", reads=True, known=options.TWINS
+    )
     draws: Annotated[
         int,
         Field(ge=0),
@@ -263,14 +242,12 @@ class SimulateSettings(Settings):
     ] = 0
     columns: list[str] = Field(default_factory=_usual_columns)
     facts: dict[str, Any] | None = None
-    out: Annotated[
-        str | None,
-        option("Run to write: .csv or .parquet.", "--out", "-o", metavar="FILE", writes=True),
-    ] = None
-    truth: Annotated[
-        str | None,
-        option("File for the truth of nodes and effects: .csv or .parquet.", metavar="FILE", writes=True),
-    ] = None
+    out: str | None = setting(
+        None, "Run to write: .csv or .parquet.", "--out", "-o", metavar="FILE", writes=True
+    )
+    truth: str | None = setting(
+        None, "File for the truth of nodes and effects: .csv or .parquet.", metavar="FILE", writes=True
+    )
     runs: list[SimulatedRun] = []
     storage: StorageSettings = StorageSettings()
 
