@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -13,7 +14,7 @@ import pytest
 from fogml.numerals import number
 from fogml.report import page
 from fogml.report.certificate import certificate
-from tests.report.chromium import CHROMIUM, Browser, Opened
+from tests.report.chromium import _SCREEN, CHROMIUM, Browser, Opened
 from tests.report.judgements import judgement
 from tests.report.many_units import batch_biases, pages_of_many
 from tests.report.pages import Page, every_page
@@ -107,6 +108,39 @@ def test_no_legend_reaches_under_the_tools(browser) -> None:
     opened.close()
     assert right > left, "the legend is too short to tell"
     assert top >= bottom
+
+
+NARROW = """(function () {
+  var faults = [];
+  document.querySelectorAll(".plot:not(.plain)").forEach(function (plot) {
+    var tools = plot.querySelector(".modebar").getBoundingClientRect();
+    plot.querySelectorAll(".legendtext").forEach(function (text) {
+      var box = text.getBoundingClientRect();
+      if (tools.width && box.right > tools.left && box.top < tools.bottom) { faults.push("tools over " + text.textContent); }
+    });
+  });
+  document.querySelectorAll(".scroll caption span").forEach(function (words) {
+    var place = words.closest(".scroll");
+    place.scrollLeft = 1e4;
+    var box = words.getBoundingClientRect(), room = place.getBoundingClientRect();
+    if (box.left < room.left - 1 || box.right > room.right + 1) { faults.push("gone: " + words.textContent); }
+    place.scrollLeft = 0;
+  });
+  return faults;
+})()"""  # noqa: E501
+
+
+@pytest.mark.parametrize("kind", ["train", "gap", "index"])
+def test_in_a_narrow_window_tools_cover_no_legend_and_captions_stay_in_sight(browser, kind) -> None:
+    opened = browser(pages()[kind])
+    opened.ask("Emulation.setDeviceMetricsOverride", **{**_SCREEN, "width": 800})
+    faults: list[str] = ["not looked at"]
+    until = time.monotonic() + 10.0  # figures are drawn anew one by one
+    while faults and time.monotonic() < until:
+        time.sleep(0.1)
+        faults = opened.tell(f"({LAYOUT})(false)") + opened.tell(NARROW)
+    opened.close()
+    assert not faults, "\n".join(faults)
 
 
 def test_a_slider_moves_what_is_replayed(browser) -> None:

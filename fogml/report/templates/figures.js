@@ -18,6 +18,28 @@
     options.toImageButtonOptions.filename = document.title + " " + plot.id;
     var plain = plot.classList.contains("plain");
     Plotly.newPlot(plot, figure.data, figure.layout, Object.assign({}, options, plain ? { displayModeBar: false } : {}));
+    plot.on("plotly_afterplot", function () { clear(plot); });
+    clear(plot);
+  }
+
+  // A legend, or names of bands above the axes, that reach under the tools make room for them.
+  function clear(plot) {
+    var tools = plot.querySelector(".modebar");
+    if (!tools || !tools.getClientRects().length) {
+      return;
+    }
+    var below = tools.getBoundingClientRect(), under = 0;
+    plot.querySelectorAll(".legend .legendtext, .infolayer .annotation-text").forEach(function (text) {
+      var box = text.getBoundingClientRect();
+      if (box.right > below.left && box.left < below.right && box.top < below.bottom && box.bottom > below.top) {
+        under = Math.max(under, below.bottom - box.top);
+      }
+    });
+    if (under > 0) {
+      var layout = plot._fullLayout, more = Math.ceil(under) + 2, high = layout.height + more;
+      plot.style.height = high + "px";
+      Plotly.relayout(plot, { "margin.t": layout.margin.t + more, height: high, autosize: true, width: null });
+    }
   }
 
   // One figure per turn, so that the first can be read while the rest are drawn.
