@@ -7,7 +7,6 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BeforeValidator, Field
 
 from fogml.cli import options
-from fogml.cli.given import option
 from fogml.cli.settings import Settings, placed, setting
 from fogml.errors import InputError
 
@@ -47,16 +46,13 @@ class MisalignmentSettings(Settings):
         "Fit a constant over the tilts for a fixture tilted across (where the data show one).",
         "--cross-tilt/--no-cross-tilt",
     )
-    state_angles: Annotated[
-        list[float] | None,
-        options.numbers("0,180,270,90"),
-        option(
-            "Turn of the gyro in its mounting plane in states 1 to 4, clockwise as seen from +z "
-            "(0,180,270,90), where FILE has no column state_angle [deg].",
-            metavar="DEG,...",
-            as_text=True,
-        ),
-    ] = None
+    state_angles: Annotated[list[float] | None, options.numbers("0,180,270,90")] = setting(
+        None,
+        "Turn of the gyro in its mounting plane in states 1 to 4, clockwise as seen from +z "
+        "(0,180,270,90), where FILE has no column state_angle [deg].",
+        metavar="DEG,...",
+        as_text=True,
+    )
     out: options.FolderIfNamed = None
 
 
@@ -120,18 +116,14 @@ class NorthSettings(Settings):
     transfer: float = setting(0.0, "Time to the next position.", metavar="SECONDS")
     drift: float = setting(0.0, "Linear drift of the bias.", metavar="DEG/H/H")
     transients: Annotated[
-        list[Annotated[tuple[float, float], Field(strict=False)]],
-        BeforeValidator(_transients),
-        option("Exponential from power-on; may be repeated.", "--transient", metavar="DEG/H,SECONDS"),
-    ] = []
+        list[Annotated[tuple[float, float], Field(strict=False)]], BeforeValidator(_transients)
+    ] = setting([], "Exponential from power-on; may be repeated.", "--transient", metavar="DEG/H,SECONDS")
     start: float = setting(0.0, "Begin of the seek after power-on.", metavar="SECONDS")
     noise: float = setting(0.0, "Angle random walk, for se.", metavar="DEG/SQRT(H)")
     sense: str = setting("cw", "Way the positions are taken.", metavar="cw|ccw", known=("cw", "ccw"))
-    order: Annotated[
-        list[float],
-        options.numbers("0,90,180,270"),
-        option("Angles of the positions.", metavar="DEG,...", as_text=True),
-    ] = [0.0, 90.0, 180.0, 270.0]
+    order: Annotated[list[float], options.numbers("0,90,180,270")] = setting(
+        [0.0, 90.0, 180.0, 270.0], "Angles of the positions.", metavar="DEG,...", as_text=True
+    )
     way: str = setting(
         "plain", "plain, drift-observing, palindrome, coarse-fine.", metavar="NAME", known=WAYS
     )

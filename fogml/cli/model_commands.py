@@ -7,7 +7,6 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError
 
 from fogml.cli import options
-from fogml.cli.given import argument, option
 from fogml.cli.settings import Settings, placed, setting
 from fogml.errors import known_are, quoted
 from fogml.strict import first_fault
@@ -71,16 +70,13 @@ class CompareSettings(options.LimitSettings):
     leave_one_out: bool = setting(
         False, "Without --test: judge each run by models fitted on the others.", "--leave-one-out/--split"
     )
-    models: Annotated[
-        list[str],
-        BeforeValidator(options.names_list),
-        option(
-            'Names with commas between, or "all".',
-            metavar="NAME,...",
-            as_text=True,
-            known="fogml.models.names:MODEL_NAMES",
-        ),
-    ] = ["all"]
+    models: Annotated[list[str], BeforeValidator(options.names_list)] = setting(
+        ["all"],
+        'Names with commas between, or "all".',
+        metavar="NAME,...",
+        as_text=True,
+        known="fogml.models.names:MODEL_NAMES",
+    )
     features: options.Features = None
     axis: options.Axis = None
     repair: options.Repair = False
@@ -140,18 +136,14 @@ class ExportJobSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.model_jobs:export_and_write"
-    model: Annotated[
-        list[str],
-        BeforeValidator(_several),
-        PlainSerializer(_one_as_text),
-        argument(
-            "MODEL...",
-            "Folder of the model, or of the results of three axes.",
-            reads=True,
-            needed="no model is given; name the folder of the model, e.g. train-results/model",
-            lost=options.LOST_MODEL,
-        ),
-    ] = []
+    model: Annotated[list[str], BeforeValidator(_several), PlainSerializer(_one_as_text)] = placed(
+        [],
+        "MODEL...",
+        "Folder of the model, or of the results of three axes.",
+        reads=True,
+        needed="no model is given; name the folder of the model, e.g. train-results/model",
+        lost=options.LOST_MODEL,
+    )
     to: str = setting(
         "c",
         "c, onnx, json, mat; segments, px4 or ardupilot.",

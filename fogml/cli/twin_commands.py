@@ -143,25 +143,19 @@ class PlanSettings(Settings):
         metavar="EFFECT|CONSTANT",
         known=options.EFFECTS,
     )
-    separate: Annotated[
-        list[list[str]],
-        BeforeValidator(_groups),
-        option(
-            "Effects to be told apart; one alone is to be shown; repeatable.",
-            metavar="A,B",
-            known=options.EFFECTS,
-        ),
-    ] = []
+    separate: Annotated[list[list[str]], BeforeValidator(_groups)] = setting(
+        [],
+        "Effects to be told apart; one alone is to be shown; repeatable.",
+        metavar="A,B",
+        known=options.EFFECTS,
+    )
     hours: float = setting(24.0, "Longest time of a run.", metavar="HOURS")
-    criterion: Annotated[
-        str,
-        BeforeValidator(_capital),
-        option(
-            "D: volume of the confidence ellipsoid; A: mean square of the standard errors.",
-            metavar="D|A",
-            known=("D", "A"),
-        ),
-    ] = "D"
+    criterion: Annotated[str, BeforeValidator(_capital)] = setting(
+        "D",
+        "D: volume of the confidence ellipsoid; A: mean square of the standard errors.",
+        metavar="D|A",
+        known=("D", "A"),
+    )
     runs: int = setting(1, "How many runs, planned in turn.")
     twin: options.Twin = "nominal"
     coldest: float = setting(-40.0, "Lowest temperature.", metavar="DEGC")
@@ -233,13 +227,12 @@ class SimulateSettings(Settings):
     twin: str | dict[str, Any] = setting(
         "nominal", "The twin.", metavar="NAME|FILE", reads=True, known=options.TWINS
     )
-    draws: Annotated[
-        int,
-        Field(ge=0),
-        option(
-            "Units drawn from what is not known of the twin, a run each: OUT-1, OUT-2, ...", metavar="UNITS"
-        ),
-    ] = 0
+    draws: int = setting(
+        0,
+        "Units drawn from what is not known of the twin, a run each: OUT-1, OUT-2, ...",
+        metavar="UNITS",
+        ge=0,
+    )
     columns: list[str] = Field(default_factory=_usual_columns)
     facts: dict[str, Any] | None = None
     out: str | None = setting(
