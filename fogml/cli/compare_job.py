@@ -6,9 +6,8 @@ from functools import partial
 from pathlib import Path
 
 from fogml.cli.model_commands import CompareSettings
-from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal
-from fogml.cli.train_job import check_settings, noise_run
+from fogml.cli.train_job import check_settings, noise_run, split_runs
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
@@ -58,16 +57,9 @@ def _makers(settings: CompareSettings) -> dict[str, partial]:
 def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Terminal) -> Comparison:
     if settings.leave_one_out == bool(settings.test):
         raise InputError("give test runs after --test, or --leave-one-out without --test")
-    train_runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
-    test_runs = (
-        open_runs(settings.test, terminal, repair=settings.repair, axis=settings.axis)
-        if settings.test
-        else None
-    )
-    if settings.strict:
-        hold_strict([(run.name, run.findings) for run in (*train_runs, *(test_runs or []))])
+    train_runs, test_runs = split_runs(settings, terminal)
     noise = noise_run(settings, terminal)
-    fits = len(makers) * (1 if test_runs is not None else len(train_runs) + 1)
+    fits = len(makers) * (1 if test_runs else len(train_runs) + 1)
     with terminal.work("comparing", total=fits) as work:
         begun: list[str] = []
 
@@ -78,7 +70,7 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
         comparison = compare(
             makers,
             train_runs,
-            test_runs,
+            test_runs or None,
             averaging_s=settings.averaging,
             design_index=settings.design_index,
             limits=settings.limits,

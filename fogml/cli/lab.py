@@ -110,7 +110,7 @@ class NorthSettings(Settings):
         reads=True,
         lost="no such file",
     )
-    azimuth: float | None = setting(None, "Simulate a seek at this azimuth.", metavar="DEG")
+    azimuth: float | None = setting(None, "Simulate a seek at this azimuth.", metavar="DEG", ge=-1e6, le=1e6)
     latitude: float | None = setting(None, "Latitude.", metavar="DEG")
     dwell: float = setting(60.0, "In a position.", metavar="SECONDS")
     transfer: float = setting(0.0, "Time to the next position.", metavar="SECONDS")
@@ -119,7 +119,7 @@ class NorthSettings(Settings):
         list[Annotated[tuple[float, float], Field(strict=False)]], BeforeValidator(_transients)
     ] = setting([], "Exponential from power-on; may be repeated.", "--transient", metavar="DEG/H,SECONDS")
     start: float = setting(0.0, "Begin of the seek after power-on.", metavar="SECONDS")
-    noise: float = setting(0.0, "Angle random walk, for se.", metavar="DEG/SQRT(H)")
+    noise: float = setting(0.0, "Angle random walk, for se.", metavar="DEG/SQRT(H)", ge=0.0)
     sense: str = setting("cw", "Way the positions are taken.", metavar="cw|ccw", known=("cw", "ccw"))
     order: Annotated[list[float], options.numbers("0,90,180,270")] = setting(
         [0.0, 90.0, 180.0, 270.0], "Angles of the positions.", metavar="DEG,...", as_text=True
@@ -166,7 +166,7 @@ class AcceptanceSettings(Settings):
     noise: str | None = setting(
         None, "Static run for noise terms and floor.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
     )
-    averaging: options.Averaging = Field(100.0, gt=0.0)
+    averaging: options.Averaging = 100.0
     turn_on_band: float | None = setting(None, "Band that tells the turn-on time.", metavar="DEG/H", gt=0.0)
     date: str | None = setting(None, "Date of issue; a line to write it on if none.")
     axis: options.Axis = None

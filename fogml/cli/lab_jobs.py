@@ -97,11 +97,6 @@ def _check(settings: NorthSettings) -> None:
         horizontal_rate(settings.latitude)
     if settings.positions:
         return
-    assert settings.azimuth is not None
-    if abs(settings.azimuth) > 1e6 or settings.azimuth != settings.azimuth:
-        raise InputError(f"azimuth {settings.azimuth:g} deg: a finite number is needed")
-    if not 0.0 <= settings.noise < float("inf"):
-        raise InputError(f"noise {settings.noise:g} deg/sqrt(h): a finite number, not negative, is needed")
     if settings.way not in WAYS:
         raise InputError(f"no way '{settings.way}'; {known_are(settings.way, WAYS)}")
 

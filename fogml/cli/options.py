@@ -100,7 +100,7 @@ Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".', met
 Parameters = Annotated[
     dict[str, Any], option("Parameter of the model; may be repeated.", "--set"), BeforeValidator(_by_name)
 ]
-Averaging = Annotated[float, option("Averaging time of the figures.", metavar="SECONDS")]
+Averaging = Annotated[float, Field(gt=0.0), option("Averaging time of the figures.", metavar="SECONDS")]
 Strict = Annotated[
     bool, option("Make warnings on the runs' temperatures and rates errors.", "--strict/--no-strict")
 ]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from pydantic import Field
-
 from fogml.cli import options
 from fogml.cli.settings import Settings, placed, setting
 from fogml.fleet import FORM
@@ -242,7 +240,7 @@ class MonitorSettings(Settings):
     patience: float = setting(
         60.0, "How long to wait for a store that is away or busy.", metavar="SECONDS", ge=0.0
     )
-    averaging: options.Averaging = Field(100.0, gt=0.0)
+    averaging: options.Averaging = 100.0
     any_unit: options.AnyUnit = False
     repair: options.Repair = False
     out: options.Folder = "monitor-results"

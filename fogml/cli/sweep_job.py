@@ -60,8 +60,6 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
     from fogml.tuning.sweep import run_sweep, study_json
 
     tracker = None if settings.track is None else Tracker(settings.track, "fogml sweep", terminal.note)
-    if not settings.averaging > 0.0:
-        raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")
     runs = open_runs(settings.runs, terminal, repair=settings.repair)
     test_runs = open_runs(settings.test, terminal, repair=settings.repair) if settings.test else []
     with terminal.work("sweeping", total=settings.trials) as work:

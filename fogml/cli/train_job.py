@@ -53,8 +53,6 @@ def check_settings(settings: TrainSettings | CompareSettings) -> None:
         from fogml.lab.navigation import error_matrices
 
         error_matrices(settings.navigation, "north")
-    if not settings.averaging > 0.0:
-        raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")
     if settings.features is not None:
         from fogml.features.parse import parse_features
 
@@ -63,7 +61,7 @@ def check_settings(settings: TrainSettings | CompareSettings) -> None:
         unfitted_model(settings)
 
 
-def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:
+def split_runs(settings: TrainSettings | CompareSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:
     """The training runs and the test runs, read and checked."""
     train_runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
     test_runs = open_runs(settings.test, terminal, repair=settings.repair, axis=settings.axis)

@@ -188,7 +188,7 @@ def test_three_positions_tell_no_drift_and_say_so(invoke_json) -> None:
         (("north", "--azimuth", 10, "--latitude", 10, "--transient", "0.2"), "write 0.2,600"),
         (("north", "--azimuth", 10, "--latitude", 10, "--dwell", -1), "dwell -1"),
         (("north", "--azimuth", 10, "--latitude", 10, "--way", "fast"), "way 'fast'"),
-        (("north", "--azimuth", 10, "--latitude", 10, "--noise", -1), "noise -1"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--noise", -1), "'noise': Input should be greater"),
         (("north", "--positions", ".", "--azimuth", 1), "give one of them"),
     ],
 )
