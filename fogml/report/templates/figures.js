@@ -11,7 +11,7 @@
     toImageButtonOptions: { format: "svg" }
   };
   var waiting = Array.prototype.slice.call(document.querySelectorAll(".plot"));
-  var shown = waiting.slice();
+  var shown = waiting.slice(), onPaper = false; // where there are no tools
 
   function draw(plot) {
     var figure = JSON.parse(document.getElementById(plot.id + "-data").textContent);
@@ -25,7 +25,7 @@
   // A legend, or names of bands above the axes, that reach under the tools make room for them.
   function clear(plot) {
     var tools = plot.querySelector(".modebar");
-    if (!tools || !tools.getClientRects().length) {
+    if (onPaper || !tools || !tools.getClientRects().length) {
       return;
     }
     var below = tools.getBoundingClientRect(), under = 0;
@@ -53,6 +53,7 @@
   }
 
   window.addEventListener("beforeprint", function () {
+    onPaper = true;
     while (waiting.length) {
       draw(waiting.shift());
     }
@@ -61,6 +62,7 @@
     });
   });
   window.addEventListener("afterprint", function () {
+    onPaper = false;
     shown.forEach(function (plot) {
       Plotly.relayout(plot, { autosize: true, width: null });
     });
