@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
@@ -28,17 +28,30 @@ _LINE_EVERY_S = 10.0
 """Where stderr is no terminal, a line on long work this often."""
 
 
-class Work(Protocol):
-    """Long work under way."""
+class Work:
+    """Long work under way, of which nothing is shown."""
+
+    def __init__(self, what: str, total: float | None) -> None:
+        self._what, self._done, self._total = what, 0.0, total
 
     def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
         """Say that `amount` more is done, and what comes next."""
+        self._done += amount
+        self.doing(doing or self._what)
 
     def doing(self, what: str) -> None:
         """Say what is being done."""
+        heed_interrupt()
+        self._what = what
+        self._show()
 
     def reached(self, done: float, total: float, doing: str) -> None:
         """Say how much of how much is done, where that is known only on the way."""
+        self._done, self._total = done, total
+        self.doing(doing)
+
+    def _show(self) -> None:
+        """Show where it is."""
 
 
 class Terminal:
@@ -134,7 +147,7 @@ class Terminal:
     def work(self, what: str, total: float | None = None) -> Iterator[Work]:
         """Show progress on stderr, with the time left where `total` is known."""
         if self.quiet:
-            yield _Silent()
+            yield Work(what, total)
         elif sys.stderr.isatty():
             with _bar(what, total) as work:
                 yield work
@@ -193,48 +206,23 @@ def _clock(seconds: float) -> str:
     return str(timedelta(seconds=round(seconds)))
 
 
-class _Silent:
-    """Nothing is shown."""
-
-    def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
-        heed_interrupt()
-
-    def doing(self, what: str) -> None:
-        heed_interrupt()
-
-    def reached(self, done: float, total: float, doing: str) -> None:
-        heed_interrupt()
-
-
-class _Lines:
+class _Lines(Work):
     """A line now and then, for logs."""
 
     def __init__(self, what: str, total: float | None) -> None:
-        self._what = what
-        self._total = total
-        self._done = 0.0
+        super().__init__(what, total)
         self._began = self._shown = time.monotonic()
 
-    def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
-        self._done += amount
-        self.doing(doing or self._what)
-
-    def reached(self, done: float, total: float, doing: str) -> None:
-        self._done, self._total = done, total
-        self.doing(doing)
-
-    def doing(self, what: str) -> None:
-        heed_interrupt()
-        self._what = what
+    def _show(self) -> None:
         now = time.monotonic()
         if now - self._shown < _LINE_EVERY_S:
             return
         self._shown = now
         spent = now - self._began
-        text = f"{what}: {_clock(spent)}"
+        text = f"{self._what}: {_clock(spent)}"
         if self._total and self._done:
             left = spent * (self._total - self._done) / self._done
-            text = f"{what}: {percent(self._done / self._total, 0)}, about {_clock(left)} left"
+            text = f"{self._what}: {percent(self._done / self._total, 0)}, about {_clock(left)} left"
         click.echo(terminal_text(text), err=True)
 
 
@@ -263,22 +251,12 @@ def _bar(what: str, total: float | None) -> Iterator[Work]:
     with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as progress:
         task = progress.add_task(visible(what), total=total)
 
-        class Bar:
-            def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
-                heed_interrupt()
-                progress.advance(task, amount)
-                if doing is not None:
-                    progress.update(task, description=visible(doing))
+        class Bar(Work):
+            def _show(self) -> None:
+                described = visible(self._what)
+                progress.update(task, completed=self._done, total=self._total, description=described)
 
-            def doing(self, what: str) -> None:
-                heed_interrupt()
-                progress.update(task, description=visible(what))
-
-            def reached(self, done: float, total: float, doing: str) -> None:
-                heed_interrupt()
-                progress.update(task, completed=done, total=total, description=visible(doing))
-
-        yield Bar()
+        yield Bar(what, total)
 
 
 UNITS_SHOWN = 40
