@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.numerals import duration
 from fogml.runs.columns import column_spec, is_accepted, parse_header
 from fogml.runs.container_files import groups_of
 from fogml.runs.csv_dialect import decoded_head
@@ -254,7 +255,11 @@ def _clock(left: list[_Field]) -> list[str]:
         why = "days, as a spreadsheet counts them"
         return [f"  time: {{source: {_quoted(one.source)}, unit: d}}    {_MARK}{why}"]
     unit = next((u for u, hint in _UNIT_IN_NAME if re.search(hint, one.name, re.IGNORECASE)), "s")
-    step = f"steps of {np.median(np.diff(one.numbers)):.6g}; " if len(one.first) > 1 else ""
+    step = ""
+    if len(one.first) > 1:
+        apart = float(np.median(np.diff(one.numbers)))
+        ms = f", or {duration(apart / 1000.0)} if they are ms" if unit == "s" and apart > 1.0 else ""
+        step = f"steps of {apart:.6g}{f': {duration(apart)}{ms}' if ms else ''}; "
     return [f"  time: {{source: {_quoted(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"]
 
 

@@ -162,3 +162,12 @@ def test_units_and_names_that_yaml_takes_for_something_else_are_read_back(tmp_pa
     for name in ("gyro", "T_in", "humidity", "compressor"):
         np.testing.assert_allclose(run.columns[name], direct.columns[name], rtol=1e-12)
     np.testing.assert_array_equal(run.columns["no"], TIME)
+
+
+@pytest.mark.parametrize(
+    ("step", "told"), [(1000, "steps of 1000: 16.7 min, or 1.00 s if they are ms"), (1, "of 1;")]
+)
+def test_a_clock_without_a_unit_is_told_by_what_its_steps_would_be(tmp_path, step, told) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("Zeit,Kreisel,Temp\n" + "".join(f"{step * i},{i % 7},{20 + i}\n" for i in range(50)))
+    assert told in draft_profile(path)
