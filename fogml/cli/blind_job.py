@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fogml.blind.folders import DIAGNOSIS, OUTCOME, BlindFolder, read_json
 from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSettings
-from fogml.cli.terminal import Terminal
+from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError, counted
 from fogml.json_files import write_json
 from fogml.numerals import short
@@ -84,7 +84,7 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
             sample_s=settings.sample,
             workers=settings.workers,
             kinds=kinds,
-            progress=lambda done, total: work.reached(done, total, f"made {done} of {total}"),
+            progress=_counted(work, "made"),
             first=settings.first,
             least_d_prime=settings.least_d_prime,
             of=settings.reality,
@@ -94,19 +94,11 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
         from fogml.blind.relatives import leave_out_relatives
 
         with terminal.work("leaving out relatives") as work:
-            leave_out_relatives(
-                folder,
-                settings.workers,
-                lambda done, total: work.reached(done, total, f"relatives of {done} of {total}"),
-            )
+            leave_out_relatives(folder, settings.workers, _counted(work, "relatives of"))
     from fogml.blind.relatives import measure_forms
 
     with terminal.work("measuring forms") as work:
-        measure_forms(
-            folder,
-            settings.workers,
-            lambda done, total: work.reached(done, total, f"forms of {done} of {total}"),
-        )
+        measure_forms(folder, settings.workers, _counted(work, "forms of"))
     config = settings.in_full().yaml("blind make", "make.yaml")
     with whole_file(folder.path / "make.yaml") as partial:
         partial.write_text(config, encoding="utf-8")
@@ -115,6 +107,11 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
         f"{counted(settings.count, 'case')} in {folder.cases}, {made} of them new; answer them: "
         f"fogml blind run {settings.directory}"
     )
+
+
+def _counted(work: Work, what: str) -> Callable[[int, int], None]:
+    """Says how many of how many are done."""
+    return lambda done, total: work.reached(done, total, f"{what} {done} of {total}")
 
 
 def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:

@@ -157,6 +157,10 @@ class Distorting(Form):
         """The output [deg/h] that comes of a noise-free `output` [deg/h], shape (n,)."""
 
 
+OUTER = ("T_out", "T2", "T4")
+"""Thermometers on the coil's outer face."""
+
+
 class Sensing(Form):
     """Falsifies what the coil's sensors feel; not linear in its amplitude, which has the sign +."""
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.blind.frame import nominal
-from fogml.blind.frame.form import Demands, Form
+from fogml.blind.frame.form import OUTER, Demands, Form
 from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.operators import late
 from fogml.blind.frame.record import World
@@ -85,7 +85,7 @@ def draw_instruments(
     error = min(float(np.exp(rng.uniform(np.log(1e-3), np.log(8e-3)))) * (0.3 if fine else 1.0), most)
     steps = [q for q in (0.02, 0.01, 0.005, 0.002, 0.001, 1e-4) if q < 2.0 * error]
     coil = {"one": ("T",), "two": ("T_in", "T_out"), "four": ("T1", "T2", "T3", "T4")}[layout]
-    places = {name: "T_out" if name in ("T_out", "T2", "T4") else "T_in" for name in coil}
+    places = {name: "T_out" if name in OUTER else "T_in" for name in coil}
     places |= {name: name for name in others if name.startswith("T_")}
 
     def thermometer(name: str, place: str) -> Thermometer:

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.blind.frame.form import Sensing, Shape
+from fogml.blind.frame.form import OUTER, Sensing, Shape
 from fogml.blind.frame.operators import lag
 from fogml.blind.frame.record import World
 
@@ -52,7 +52,7 @@ class Elsewhere(Sensing):
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        outer = name in ("T_out", "T2", "T4")
+        outer = name in OUTER
         share = amplitude * (shape["outer"] if outer else 1.0)
         return temperature + share * (world.nodes["T_case"] - temperature)
 
@@ -73,7 +73,7 @@ class StickySensor(Sensing):
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
         """Inner sensors show the held value by a share of `amplitude`."""
-        if name in ("T_out", "T2", "T4"):
+        if name in OUTER:
             return temperature
         within = (world.time + shape["phase"] * shape["interval"]) % shape["interval"]
         fresh = within >= shape["hold"]

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Sensing, Shape
+from fogml.blind.frame.form import OUTER, Additive, Demands, Distorting, ScaleFactor, Sensing, Shape
 from fogml.blind.frame.operators import backlash, late, slab_lag
 from fogml.blind.frame.record import EARTH_DEG_H, World
 
@@ -130,9 +130,6 @@ class MotorPoles(Additive):
         return 3600e-6 * world.table_rate * pull
 
 
-_OUTER = ("T_out", "T2", "T4")
-
-
 class LagThroughGlue(Sensing):
     """A thermometer behind a bed of glue: heat creeps through it, on one face more slowly."""
 
@@ -144,7 +141,7 @@ class LagThroughGlue(Sensing):
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
         """The far face of a slab whose L^2 / D is twice the amplitude."""
-        tau = 2.0 * amplitude * (shape["outer"] if name in _OUTER else 1.0)
+        tau = 2.0 * amplitude * (shape["outer"] if name in OUTER else 1.0)
         return slab_lag(world.time, temperature, max(tau, 1e-3), modes=8)
 
 
@@ -157,7 +154,7 @@ class LagOneFace(Sensing):
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        return temperature if name in _OUTER else late(temperature, amplitude, world.sample_s)
+        return temperature if name in OUTER else late(temperature, amplitude, world.sample_s)
 
 
 class UnevenSteps(Sensing):
@@ -187,7 +184,7 @@ class BetweenCanAndLid(Sensing):
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
         """A mix of the place with can or lid."""
-        if name in _OUTER:
+        if name in OUTER:
             return temperature + amplitude * (world.nodes["T_can"] - temperature)
         return temperature + amplitude * shape["lid"] * (world.nodes["T_lid"] - temperature)
 
@@ -218,7 +215,7 @@ class SlippingSensor(Sensing):
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        return temperature if name in _OUTER else backlash(temperature, amplitude)
+        return temperature if name in OUTER else backlash(temperature, amplitude)
 
 
 class LoosenedSensor(Sensing):
@@ -232,7 +229,7 @@ class LoosenedSensor(Sensing):
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
         """A mix with the can after a share of the run."""
-        if name in _OUTER:
+        if name in OUTER:
             return temperature
         loose = world.time > shape["at"] * world.time[-1]
         return temperature + amplitude * loose * (world.nodes["T_can"] - temperature)

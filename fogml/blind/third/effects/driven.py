@@ -8,11 +8,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fogml.arrays import FloatArray
-from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Sensing, Shape
+from fogml.blind.frame.form import OUTER, Additive, Demands, Distorting, ScaleFactor, Sensing, Shape
 from fogml.blind.frame.operators import late
 from fogml.blind.frame.record import World
-
-_OUTER = ("T_out", "T2", "T4")
 
 
 class PolarisationProduct(Additive):
@@ -171,8 +169,8 @@ class FeelsTheMount(Sensing):
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        share = amplitude * (1.0 if name in _OUTER else shape["inner"])
-        beside = world.nodes["T_cover" if name in _OUTER else "T_hub"]
+        share = amplitude * (1.0 if name in OUTER else shape["inner"])
+        beside = world.nodes["T_cover" if name in OUTER else "T_hub"]
         return temperature + share * (beside - temperature)
 
 
