@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from fogml.errors import InputError
+from fogml.errors import InputError, install_words
 
 if TYPE_CHECKING:
     from sqlalchemy.engine import URL
@@ -27,9 +27,7 @@ def parse_url(url: str, given_as: str = "--storage") -> URL:
         from sqlalchemy.engine import make_url
         from sqlalchemy.exc import ArgumentError
     except ImportError:
-        raise InputError(
-            f"{given_as}: a database needs SQLAlchemy: pip install -e '.[sweep]' in fogml's source"
-        ) from None
+        raise InputError(f"{given_as}: a database needs SQLAlchemy: {install_words('sweep')}") from None
     try:
         parsed = make_url(url)
     except ArgumentError:

@@ -75,6 +75,11 @@ def known_are(name: str, known: Iterable[str], what: str = "known") -> str:
     return f"{did_you_mean(name, known)}{what} are {', '.join(known)}"
 
 
+def install_words(extra: str) -> str:
+    """How to install what an extra brings, with a network and without."""
+    return f"pip install '.[{extra}]' in fogml's source; without a network: fogml docs install"
+
+
 def counted(count: int, word: str, words: str | None = None) -> str:
     """``1 row``, ``3 rows``; `words` where the plural is no mere s."""
     return f"{count} {word if count == 1 else words or word + 's'}"

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
-from fogml.errors import InputError
+from fogml.errors import InputError, install_words
 
 KEY = "fogml.key"
 """Tag that tells a trial or unit from every other."""
@@ -64,9 +64,7 @@ class Tracker:
         try:
             from mlflow import MlflowClient
         except ImportError as error:
-            raise InputError(
-                f"--track needs MLflow ({error}): pip install -e '.[mlflow]' in fogml's source"
-            ) from None
+            raise InputError(f"--track needs MLflow ({error}): {install_words('mlflow')}") from None
         self._place, self._note, self._away = place, note, False
         self._client: Any = None
         self._known: set[str] = set()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+import fogml
 from fogml.errors import (
     LONGEST_MESSAGE,
     LONGEST_QUOTED,
     InputError,
     did_you_mean,
     in_one_line,
+    install_words,
     listed,
     quoted,
 )
@@ -94,3 +98,10 @@ def test_a_message_that_points_into_a_text_has_one_line_without_it() -> None:
     told = "a.csv: no temperature 'T_in'\n  T, T_in-T_out, T^2\n     ^\nthe run holds T"
     assert in_one_line(told) == "a.csv: no temperature 'T_in'; the run holds T"
     assert in_one_line("a.csv: T^2 is cold") == "a.csv: T^2 is cold"
+
+
+def test_how_to_install_an_extra_is_said_at_one_place():
+    """It is on no package index, and an editable install is for who works on it."""
+    home = Path(fogml.__file__).parent
+    said = [path.name for path in home.rglob("*.py") if "pip install '" in path.read_text("utf-8")]
+    assert said == ["errors.py"] and "pip install '.[xlsx]'" in install_words("xlsx")

@@ -11,7 +11,7 @@ from fogml.cli.main import COMMANDS
 from fogml.cli.run_commands import AppSettings
 from fogml.cli.settings import SHIPPED, Settings, given_settings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, install_words, quoted
 from fogml.locks import sole_writer
 
 INPUTS: Mapping[str, Mapping[str, str]] = {
@@ -184,9 +184,7 @@ def serve(settings: AppSettings, terminal: Terminal) -> None:
         from fogml.app.server import listen
         from fogml.app.server import serve as serve_app
     except ImportError as error:
-        raise InputError(
-            f"fogml app needs Tornado ({error}): pip install -e '.[app]' in fogml's source"
-        ) from None
+        raise InputError(f"fogml app needs Tornado ({error}): {install_words('app')}") from None
     home = Path(settings.folder)
     if home.exists() and not home.is_dir():
         raise InputError(f"{home}: is a file, a folder was expected; choose another FOLDER")

@@ -142,7 +142,10 @@ class Group(click.Group):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         if args and not args[0].startswith("-") and args[0] not in self.known:
-            hint = did_you_mean(args[0], self.known).rstrip() or f"commands are {', '.join(self.known)}"
+            groups = [name for name, (place, _) in self.known.items() if place.endswith(":COMMANDS")]
+            within = [f"{name} {args[0]}" for name in groups if args[0] in load(self.known[name][0])]
+            near = f"did you mean '{within[0]}'?" if within else did_you_mean(args[0], self.known).rstrip()
+            hint = near or f"commands are {', '.join(self.known)}"
             fail(f"no such command '{args[0]}'; {hint}")
         return super().resolve_command(ctx, args)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml import __version__
 from fogml.arrays import FloatArray
-from fogml.errors import InputError, first_line
+from fogml.errors import InputError, first_line, install_words
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored
 from fogml.features.atoms import DEAD_BAND, Atom, evaluate
@@ -50,9 +50,7 @@ def onnx_model(
     try:
         from onnx import TensorProto, helper
     except ImportError:
-        raise InputError(
-            "export: onnx is not installed; pip install -e '.[export]' in fogml's source"
-        ) from None
+        raise InputError(f"export: onnx is not installed; {install_words('export')}") from None
     if not plan.names:
         raise InputError(
             f"export: a model of kind '{plan.kind}' has no features, so no graph; export it --to c or json"
@@ -127,9 +125,7 @@ def session_of(data: bytes) -> Any:
     try:
         from onnxruntime import InferenceSession
     except ImportError:
-        raise InputError(
-            "export: onnxruntime is not installed; pip install -e '.[export]' in fogml's source"
-        ) from None
+        raise InputError(f"export: onnxruntime is not installed; {install_words('export')}") from None
     try:
         return InferenceSession(data, providers=["CPUExecutionProvider"])
     except Exception as error:  # of its own kinds, which it does not tell apart

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError, first_line
+from fogml.errors import InputError, first_line, install_words
 from fogml.export.check import Difference, value_difference
 from fogml.export.onnx_graph import BEYOND, ONNX_FILE, OPSET, finished_model, session_of
 from fogml.export.plan import Plan
@@ -76,9 +76,7 @@ def _sklearn_onnx(model: SklearnModel, dtype: str, card: str) -> onnx.ModelProto
         from skl2onnx import convert_sklearn
         from skl2onnx.common.data_types import DoubleTensorType, FloatTensorType
     except ImportError:
-        raise InputError(
-            "export: skl2onnx is not installed; pip install -e '.[export]' in fogml's source"
-        ) from None
+        raise InputError(f"export: skl2onnx is not installed; {install_words('export')}") from None
     double = dtype == "float64"
     real, kind = (np.float64, TensorProto.DOUBLE) if double else (np.float32, TensorProto.FLOAT)
     width, fitted = len(model.feature_names), model.regressor_

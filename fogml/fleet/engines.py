@@ -8,7 +8,7 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Any
 
-from fogml.errors import InputError, first_line
+from fogml.errors import InputError, first_line, install_words
 from fogml.fleet.tasks import Task, finished, lost, run_task
 from fogml.folders import nearest_folder
 from fogml.outputs import settle
@@ -131,7 +131,7 @@ def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outco
         from distributed import as_completed as completed_on
         from distributed.scheduler import KilledWorker
     except ImportError:
-        raise InputError("a cluster needs Dask: pip install -e '.[cluster]' in fogml's source") from None
+        raise InputError(f"a cluster needs Dask: {install_words('cluster')}") from None
     try:
         client = Client(address, timeout=_ANSWER_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -210,7 +210,7 @@ def _verdict(
     rows: Sequence[Mapping[str, Any]], limits: Limits, seen: Sequence[str], still: Sequence[str]
 ) -> tuple[str, list[str]]:
     if not limits.by_quantity:
-        return NO_LIMITS, [*still, "no limits are stated"]
+        return NO_LIMITS, [*still, "nothing is accepted or rejected"]
     limited = [row for row in rows if row["limit"] is not None]
     missed = [f"{row['name']} is over its limit" for row in limited if row["met"] is False]
     lacking = [_lacking(row) for row in limited if row["met"] is None]

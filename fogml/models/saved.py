@@ -139,6 +139,8 @@ def load_model(folder: str | Path) -> DriftModel:
     if not (folder / MODEL_FILE).is_file() and (folder / "model" / MODEL_FILE).is_file():
         folder = folder / "model"  # results of a training were named
     path = folder / MODEL_FILE
+    if folder.is_file():
+        raise InputError(f"{folder}: is a file; {_REMEDY}")
     values = read_json(path, _REMEDY, _MOST_MODEL_BYTES)
     if isinstance(values, dict) and values.get("schema") == "fogml.model/1":
         raise InputError(

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from fogml.databases import engine_settings, parse_url, shown_url, told_by
-from fogml.errors import InputError
+from fogml.errors import InputError, install_words
 from fogml.locks import NO_ROOM, sole_writer
 from fogml.monitor.record import NUMBERS, TEXTS, RunRecord
 from fogml.outputs import folder_to_fill, whole_file
@@ -211,7 +211,7 @@ class DatabaseStore(Store):
             except (ImportError, NoSuchModuleError) as error:
                 raise InputError(
                     f"--store {shown_url(self.url)}: no driver for it ({error}); for PostgreSQL: "
-                    "pip install -e '.[sweep]' in fogml's source"
+                    f"{install_words('sweep')}"
                 ) from None
             except (SQLAlchemyError, OSError) as error:
                 raise _Away(

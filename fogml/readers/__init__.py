@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from fogml.errors import install_words
+
 __all__ = ["READERS", "UNCALCULATED", "Reader", "plain_path", "reader_of", "reader_of_content"]
 
 UNCALCULATED = "uncalculated"
@@ -124,5 +126,5 @@ def extra_hint(reader: Reader, path: Path) -> str:
     package = reader.package.partition(".")[0]
     return (
         f"{path.name}: its format is {reader.label}; reading it needs the package {package}: "
-        f"pip install 'fogml-lab[{reader.extra}]', or in fogml's source pip install -e '.[{reader.extra}]'"
+        + install_words(reader.extra or "readers")
     )

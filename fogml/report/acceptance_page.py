@@ -217,7 +217,7 @@ def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
         low, high = found["ci90"]
         first = (
             f"{counts['accepted']} of {plural(found['judged'], 'unit')} accepted: a yield of "
-            f"{percent(found['share'])} (90 % of {percent(low)} to {percent(high)})."
+            f"{percent(found['share'])} (90 % interval: {percent(low)} to {percent(high)})."
         )
     sentences = [first]
     if counts["incomplete"]:

@@ -28,7 +28,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fogml.errors import InputError, listed, quoted
+from fogml.errors import InputError, install_words, listed, quoted
 from fogml.runs.columns import parse_header
 from fogml.runs.container_files import Group, grouped, unknown_fields
 from fogml.runs.facts import Facts, facts_from
@@ -52,7 +52,7 @@ def _h5py_module() -> Any:
         import h5py
     except ImportError:
         raise InputError(
-            "HDF5 and MATLAB 7.3 files need the package h5py: pip install -e '.[hdf5]' in fogml's source"
+            f"HDF5 and MATLAB 7.3 files need the package h5py: {install_words('hdf5')}"
         ) from None
     return h5py
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from fogml.databases import engine_settings, parse_url, shown_url, told_by
-from fogml.errors import InputError
+from fogml.errors import InputError, install_words
 from fogml.outputs import folder_to_fill
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def import_optuna() -> Any:
     try:
         import optuna
     except ImportError:
-        raise InputError("a sweep needs Optuna: pip install -e '.[sweep]' in fogml's source") from None
+        raise InputError(f"a sweep needs Optuna: {install_words('sweep')}") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     return optuna
 
@@ -157,8 +157,7 @@ def _database(url: str) -> BaseStorage:
             return _closing(RDBStorage(text, engine_kwargs=engine))
     except (ImportError, NoSuchModuleError) as error:
         raise InputError(
-            f"--storage {shown(url)}: no driver for it ({error}); for PostgreSQL: pip install -e '.[sweep]' "
-            "in fogml's source"
+            f"--storage {shown(url)}: no driver for it ({error}); for PostgreSQL: {install_words('sweep')}"
         ) from None
     except (SQLAlchemyError, OSError, RuntimeError) as error:
         raise InputError(

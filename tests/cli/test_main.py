@@ -341,3 +341,7 @@ def test_an_interrupt_that_a_library_makes_another_error_of_is_one(tmp_path, nam
 def test_the_program_runs():
     found = run_program("--version")
     assert (found.returncode, found.stderr) == (0, "")
+
+
+def test_a_command_of_a_group_is_named_where_the_group_is_left_out():
+    assert "no such command 'acceptance'; did you mean 'lab acceptance'?" in run_program("acceptance").stderr

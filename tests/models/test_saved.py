@@ -423,3 +423,9 @@ class TestScikitLearn:
 
 def test_results_of_a_training_name_their_model(folder, model, train):
     assert np.array_equal(load_model(folder.parent).predict(train), model.predict(train))
+
+
+def test_a_file_in_the_place_of_the_folder_is_told(tmp_path):
+    (tmp_path / "report.html").write_text("x")
+    with pytest.raises(InputError, match=r"report\.html: is a file; name the folder that"):
+        load_model(tmp_path / "report.html")

@@ -119,7 +119,7 @@ def test_a_missing_package_is_named_with_its_extra(tmp_path, monkeypatch, reader
         pytest.skip("said where the file is opened, test_hdf5_without_h5py")
     path.write_bytes(HEADS.get(reader.name, b"".join(reader.magic[:1])) + bytes(50))
     monkeypatch.setattr(reader_process.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=rf"its format is {reader.label}.*fogml-lab\[{reader.extra}\]"):
+    with pytest.raises(InputError, match=rf"its format is {reader.label}.*pip install .\.\[{reader.extra}\]"):
         read_run(path)
 
 

@@ -254,7 +254,7 @@ def test_hdf5_without_h5py(tmp_path, monkeypatch):
     path = tmp_path / "run.h5"
     good_hdf5(path)
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(InputError, match=r"package h5py: pip install -e '\.\[hdf5\]'"):
+    with pytest.raises(InputError, match=r"package h5py: pip install '\.\[hdf5\]'"):
         read_run(path)
 
 
