@@ -36,8 +36,8 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         "North (`lab north --positions`)",
         north,
         200,
-        "Azimuth and latitude at random, 4 × 60 s at 1 Hz unless told, a steady bias. A bias that "
-        "bends at start-up and errors of the table's angles are in no standard error.",
+        "Azimuth and latitude at random, 4 × 60 s at 1 Hz unless told, a steady bias unless told. "
+        "Errors of the table's angles are in no standard error.",
     ),
     (
         "Rate table (`lab rate`)",
@@ -146,8 +146,7 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         monitor,
         200,
         f"{monitor.RUNS} runs of a unit, an alarm past {monitor.LIMIT:.0f}; stated is at most. "
-        "Sizes are those at the moment of the first alarm after the change: what is noticed early "
-        "looked large, so that steps near the least that is noticed are overstated.",
+        "Sizes and shapes are those of the first alarm after the change, as the runs since tell it.",
     ),
 )
 

@@ -13,10 +13,14 @@ from fogml.intervals import Z90
 
 @dataclass(frozen=True)
 class Told:
-    """One estimate: off the truth by `error`, with 90 % half-width `half` (None where none is stated)."""
+    """One estimate: off the truth by `error`, with 90 % half-width `half` (None where none is stated).
+
+    `held` says whether an interval that need not be even about the estimate holds the truth; None of others.
+    """
 
     error: float
     half: float | None
+    held: bool | None = None
 
 
 def of_errors(error: float, se: float | None) -> Told:
@@ -26,7 +30,9 @@ def of_errors(error: float, se: float | None) -> Told:
 
 def of_interval(value: float, truth: float, ends: tuple[float, float] | None) -> Told:
     """An estimate that is stated with a 90 % interval about it."""
-    return Told(value - truth, None if ends is None else 0.5 * (ends[1] - ends[0]))
+    if ends is None:
+        return Told(value - truth, None)
+    return Told(value - truth, 0.5 * (ends[1] - ends[0]), ends[0] <= truth <= ends[1])
 
 
 def wilson(part: int, whole: int, z: float = 1.96) -> tuple[float, float]:
@@ -46,7 +52,8 @@ def coverage(case: str, quantity: str, told: Iterable[Told | None]) -> dict[str,
         return row | {"held": None}
     error = np.array([one.error for one in found])
     half = np.array([one.half for one in found], dtype=np.float64)
-    held = int(np.sum(np.abs(error) <= half))
+    within = [one.held for one in found]
+    held = int(np.sum([abs(e) <= h if w is None else w for e, h, w in zip(error, half, within)]))
     z = Z90 * error / half
     return row | {
         "held": held / len(found),

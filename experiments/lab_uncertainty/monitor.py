@@ -73,7 +73,7 @@ def recorded(months: Months, rng: np.random.Generator) -> tuple[FloatArray, Floa
 
 def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
     """Rows of one case."""
-    months, false, onset = CASES[name], 0, []
+    months, false, onset, others = CASES[name], 0, [], []
     sizes: list[Told | None] = []
     for repeat in range(repeats):
         rng = np.random.default_rng([seed, repeat])
@@ -86,6 +86,7 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
             continue
         false += any(change.raised_at < months.onset for change in chart.changes)
         real = [change for change in chart.changes if change.raised_at >= months.onset]
+        others += [(one.shape != months.shape, 1.0 - one.probability) for one in real[:1]]
         if real and real[0].shape == months.shape:
             sizes.append(of_interval(real[0].size, size, real[0].size_ci90))
             low, high = real[0].onset_ci90
@@ -97,4 +98,6 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
         rows.append(
             share(name, "run of onset not among those of 90 %", len(onset) - sum(onset), len(onset), 0.1)
         )
+        wrong, stated = np.array(others, dtype=np.float64).T
+        rows.append(share(name, "of another shape", int(wrong.sum()), len(others), float(stated.mean())))
     return rows

@@ -51,6 +51,9 @@ CASES = {
     ),
     "at start-up, 0.05 deg/h over 600 s": Seek(NAVIGATION, transient=(0.05, 600.0)),
     "at start-up, 0.5 deg/h over 300 s": Seek(NAVIGATION, transient=(0.5, 300.0)),
+    "at start-up, 0.15 deg/h over 150 s": Seek(NAVIGATION, transient=(0.15, 150.0)),
+    "at start-up, 1.5 deg/h over 150 s": Seek(NAVIGATION, transient=(1.5, 150.0)),
+    "10 min a position, 0.5 deg/h over 1500 s": Seek(NAVIGATION, dwell_s=600.0, transient=(0.5, 1500.0)),
     "table's angles off by 0.01 deg": Seek(NAVIGATION, index_deg=0.01),
 }
 
@@ -90,4 +93,4 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
         azimuths.append(fix.method)
         truth.append(of_errors(off, fix.se_deg))
     row = coverage(name, "azimuth [deg]", truth)
-    return [row | {"drift_observing": azimuths.count("drift-observing") / repeats}]
+    return [row | {"averaged": azimuths.count("averaged") / repeats}]

@@ -209,7 +209,7 @@ def page(found: Mapping[str, list[dict]]) -> str:
         *_changed_table(change),
         "",
         "A step of the bias by 3 deviations is what flicker brings now and then: it is found late or not at "
-        "all. The size is that at the moment of the alarm: what is noticed early looked large.",
+        "all. Size and run are those of the first alarm, as the runs since tell it.",
         "",
         "## Where the bias is known not to wander (`--no-wander`)",
         "",

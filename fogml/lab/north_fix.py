@@ -34,7 +34,7 @@ class NorthFix:
         Azimuth clockwise from north of the input axis in the first angle's position, and its standard
         error under the gyro's own noise [deg]; None where the samples are too few to tell that.
     method
-        ``plain``, ``drift-observing`` or ``bend-observing``.
+        ``plain``, ``drift-observing``, ``bend-observing``, or ``averaged``.
     plain_deg, observed_deg, bent_deg
         Results with a constant bias, one that drifts and one that bends [deg]; None where the positions do
         not tell the drift or the bend.
@@ -42,6 +42,8 @@ class NorthFix:
         Linear drift seen [deg/h per h] and its standard error; None where they do not tell it.
     bend_deg_h_h2, bend_se
         Coefficient of the time squared [deg/h per h^2] and its standard error, the same.
+    bend_probability
+        Share of results with a bend in one that is averaged; None of others.
     horizontal_deg_h
         Horizontal Earth rate that the positions show [deg/h].
     offset_deg_h
@@ -66,6 +68,7 @@ class NorthFix:
     drift_se: float | None
     bend_deg_h_h2: float | None
     bend_se: float | None
+    bend_probability: float | None
     horizontal_deg_h: float
     offset_deg_h: float
     error: DriftError
@@ -99,8 +102,18 @@ def azimuth_se(found: FloatArray, covariance: FloatArray | None) -> float | None
     return float(np.degrees(np.sqrt(weights @ off**2 @ weights)))
 
 
-def fix_notes(fix: NorthFix, covariance: FloatArray | None, bent_se_deg: float | None) -> list[str]:
-    """Notes on what the samples do not tell, and on a bias that bends."""
+@dataclass(frozen=True)
+class LeftIn:
+    """The next power of time, which a result leaves in: its coefficient, and the azimuth without it [deg]."""
+
+    value: float
+    se: float | None
+    azimuth_deg: float
+    azimuth_se_deg: float | None
+
+
+def fix_notes(fix: NorthFix, covariance: FloatArray | None, left: LeftIn | None) -> list[str]:
+    """Notes on what the samples do not tell, and on a bias that bends otherwise than is taken out."""
     told = []
     if fix.drift_deg_h_h is None:
         told.append("the positions don't tell a drift: the standard error holds without one")
@@ -112,15 +125,26 @@ def fix_notes(fix: NorthFix, covariance: FloatArray | None, bent_se_deg: float |
             f"the positions don't tell north: the Earth rate that they show, {short(fix.horizontal_deg_h)} "
             "deg/h, is within its noise; stay longer in each"
         )
-    bend, bend_se, bent = fix.bend_deg_h_h2, fix.bend_se, fix.bent_deg
-    if fix.method == "bend-observing" or bend is None or bent is None or not bend_se:
+    if left is None or not left.se:
         return told
-    moved = float(abs(wrapped(bent - fix.azimuth_deg)))
-    if abs(bend) > _BEND_SHOWS * bend_se and moved > _LAST_DIGIT_DEG:
+    shows = abs(left.value) / left.se
+    without = fix.bent_deg if fix.method == "averaged" and fix.bent_deg is not None else fix.azimuth_deg
+    moved = float(abs(wrapped(left.azimuth_deg - without)))
+    if not (shows > _BEND_SHOWS and moved > _LAST_DIGIT_DEG):
+        return told
+    if fix.method == "averaged":
         told.append(
-            f"the bias bends during the seek, as at start-up ({abs(bend) / bend_se:.1f} standard errors), "
-            "which the azimuth's standard error does not hold: with the bend taken out (--method "
-            f"bend-observing) it is {bent:.4f} ± {short(bent_se_deg, 2)} deg"
+            f"the bias bends otherwise than a square of time ({shows:.1f} standard errors): what goes beyond "
+            "a cube the azimuth's standard error does not hold; seek again when the gyro has warmed up"
+        )
+    else:
+        straight = fix.method != "bend-observing"
+        how = "" if straight else " otherwise than a square of time"
+        which = "the bend taken out (--method bend-observing)" if straight else "a cube of time taken out"
+        told.append(
+            f"the bias bends{how} during the seek, as at start-up ({shows:.1f} standard errors), which the "
+            f"azimuth's standard error does not hold: with {which} it is {left.azimuth_deg:.4f} ± "
+            f"{short(left.azimuth_se_deg, 2)} deg"
         )
     return told
 

@@ -45,7 +45,7 @@ def recorded_north_json(
         run, sense=sense, order_deg=order_deg, method=method, settle_s=settle_s, latitude_deg=latitude_deg
     )
     error = fix.error
-    off_from = fix.bent_deg if fix.method == "bend-observing" else fix.observed_deg
+    off_from = fix.observed_deg if fix.method == "plain" else fix.azimuth_deg
     return {
         "schema": SCHEMA,
         "kind": "recorded",
@@ -60,6 +60,7 @@ def recorded_north_json(
         "drift_se": fix.drift_se,
         "bend_deg_h_per_h2": fix.bend_deg_h_h2,
         "bend_se": fix.bend_se,
+        "bend_probability": fix.bend_probability,
         "method": fix.method,
         "plain_azimuth_deg": fix.plain_deg,
         "drift_observing_azimuth_deg": fix.observed_deg,

@@ -16,7 +16,7 @@ from fogml.lab.north import (
     check_design,
     design_matrix,
 )
-from fogml.lab.north_fix import NorthFix, angle_notes, azimuth_se, fix_notes, set_up_notes
+from fogml.lab.north_fix import LeftIn, NorthFix, angle_notes, azimuth_se, fix_notes, set_up_notes
 from fogml.lab.north_schemes import wrapped
 from fogml.models.linear import LinearRegressor
 from fogml.models.row_noise import MEANS_A_STAY, noise_covariance
@@ -62,9 +62,10 @@ def north_from_positions(
     order_deg
         Angle of position 1, 2, ... [deg].
     method
-        ``plain``, ``drift-observing``, ``bend-observing``, or ``auto``: the second where the positions tell
-        a linear drift. A drift too small to show may be a multiple of the plain result's standard error. The
-        third takes out a square of time as well, as at start-up, at up to twice the standard error.
+        ``plain``, ``drift-observing``, ``bend-observing``, or ``auto``. Where the positions tell a linear
+        drift, that takes it out, as one too small to show may be a multiple of the plain result's standard
+        error. A square of time as well, as at start-up, costs up to twice the standard error: so ``auto``
+        averages the results without it, with it and with a cube by how probable they are.
     settle_s
         Time left out at the begin of each stay [s].
     latitude_deg
@@ -83,18 +84,20 @@ def north_from_positions(
     angles = np.asarray(order_deg, dtype=np.float64)[stays.positions.astype(int) - 1]
     plain_design = design_matrix(angles, sense, None)
     check_design(plain_design, False)
-    if _tells_drift(angles, sense, stays, method):
-        fits = [_fitted(stays, plain_design, order) for order in (0, 1, 2)]
-    else:
-        fits = [_fitted(stays, plain_design, 0)]
-    if len(fits) > 2 and not _tells_bend(stays, plain_design):
-        fits.pop()
-    order = {"plain": 0, "drift-observing": 1, "bend-observing": 2, "auto": min(len(fits) - 1, 1)}[method]
-    if order >= len(fits):
+    highest = 3 if _tells_drift(angles, sense, stays, method) else 0
+    while highest > 1 and not _tells_power(stays, plain_design, highest):
+        highest -= 1
+    fits = [_fitted(stays, plain_design, order) for order in range(highest + 1)]
+    order = {"plain": 0, "drift-observing": 1, "bend-observing": 2, "auto": min(highest, 1)}[method]
+    if order > highest:
         raise InputError(f"{run.name}: the samples in each position are too few to tell a bend of the bias")
-    chosen, covariance = fits[order]
-    drift, drift_se = _term(fits[max(order, 1)], 3) if len(fits) > 1 else (None, None)
-    bend, bend_se = _term(fits[2], 4) if len(fits) > 2 else (None, None)
+    (chosen, covariance), share, called = fits[order], None, METHODS[1 + order]
+    averaged = _averaged(fits[1:], len(stays.means)) if method == "auto" else None
+    if averaged is not None:
+        chosen, covariance, share = averaged
+        called = "averaged"
+    drift, drift_se = _term(fits[max(order, 1)], 3) if highest else (None, None)
+    bend, bend_se = _term(fits[2], 4) if highest > 1 else (None, None)
     horizontal = float(np.hypot(chosen[0], chosen[1]))
     # What a drift of 1 deg/h per h does to the plain result, where none is taken out.
     hours = (stays.time - stays.time.mean()) / 3600.0
@@ -102,9 +105,9 @@ def north_from_positions(
     p = _solved(stays, plain_design, taken if np.any(taken) else 1e-9 * hours, 0).coef_
     found = [_azimuth(fit[0]) for fit in fits]
     fix = NorthFix(
-        azimuth_deg=found[order],
+        azimuth_deg=_azimuth(chosen),
         se_deg=azimuth_se(chosen, covariance),
-        method=METHODS[1 + order],
+        method=called,
         plain_deg=found[0],
         observed_deg=found[1] if len(found) > 1 else None,
         bent_deg=found[2] if len(found) > 2 else None,
@@ -112,6 +115,7 @@ def north_from_positions(
         drift_se=drift_se,
         bend_deg_h_h2=bend,
         bend_se=bend_se,
+        bend_probability=share,
         horizontal_deg_h=horizontal,
         offset_deg_h=float(chosen[2]),
         error=DriftError(float(p[0]), float(p[1]), horizontal),
@@ -120,8 +124,13 @@ def north_from_positions(
         positions=stays.positions,
         noise_deg_h=_sample_noise(stays),
     )
+    # What the chosen result leaves in, at least in part.
+    beyond = 2 if called in METHODS[1:3] else 3
+    left = None
+    if beyond <= highest:
+        left = LeftIn(*_term(fits[beyond], 2 + beyond), found[beyond], azimuth_se(*fits[beyond]))
     notes = [
-        *fix_notes(fix, covariance, azimuth_se(*fits[2]) if len(fits) > 2 else None),
+        *fix_notes(fix, covariance, left),
         *set_up_notes(run, fix, covariance, latitude_deg),
         *angle_notes(run, stays.times, angles * SENSES[sense], angle_tolerance_deg),
     ]
@@ -138,10 +147,48 @@ def _tells_drift(angles: FloatArray, sense: str, stays: _Stays, method: str) -> 
     return True
 
 
-def _tells_bend(stays: _Stays, design: FloatArray) -> bool:
-    columns = _columns(stays, design, 2)
+def _tells_power(stays: _Stays, design: FloatArray, order: int) -> bool:
+    """Whether the samples tell a power of time from all that is solved for beside it."""
+    columns = _columns(stays, design, order)
     columns = np.column_stack((np.ones(len(columns)), columns / np.linalg.norm(columns, axis=0)))
     return bool(np.linalg.matrix_rank(columns, tol=1e-6) == columns.shape[1])
+
+
+def _averaged(
+    fits: Sequence[tuple[FloatArray, FloatArray | None]], stays: int
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """Mean of results with ever more powers of time, its covariance, and the probability of a bend.
+
+    How far they part is in the covariance. Each power is as likely there as not where the one before it is.
+    Before the data their coefficients are normal about 0, as wide as a single stay would tell them: unit
+    information (R. E. Kass & L. Wasserman, J. Am. Stat. Assoc. 90, 1995).
+
+    Parameters
+    ----------
+    fits
+        With a linear drift first: coefficients, and their covariance.
+    stays
+        How many tell them.
+
+    Returns
+    -------
+    found, covariance, probability
+        None where there is nothing to average, or no covariance.
+    """
+    told = [(found, own) for found, own in fits if own is not None and np.all(np.diag(own) > 0.0)]
+    if len(told) < max(len(fits), 2):
+        return None
+    size, logs = len(told[-1][0]), np.zeros(len(told))
+    for bends, (found, own) in enumerate(told):
+        prior = -np.log(2.0) * min(bends + 1, len(told) - 1)
+        square = float(found[4:] @ np.linalg.solve(own[4:, 4:], found[4:]))
+        logs[bends] = prior + 0.5 * square * stays / (1.0 + stays) - 0.5 * bends * np.log1p(stays)
+    weights = np.exp(logs - np.logaddexp.reduce(logs))
+    padded = np.array([np.pad(found, (0, size - len(found))) for found, _ in told])
+    mean, covariance = weights @ padded, np.zeros((size, size))
+    for weight, off, (_, own) in zip(weights, padded - mean, told, strict=True):
+        covariance += weight * (np.pad(own, (0, size - len(own))) + np.outer(off, off))
+    return mean, covariance, float(1.0 - weights[0])
 
 
 def _term(fit: tuple[FloatArray, FloatArray | None], place: int) -> tuple[float, float | None]:

@@ -20,12 +20,15 @@ over w and q. The sum of their ratios over j, less the number of runs, is then a
 for w and q as likely as assumed: an alarm once the sum passes A comes falsely no sooner than after A runs in
 the mean, whatever mean and sigma are (S. W. Roberts, "A comparison of some control chart procedures",
 Technometrics 8, 1966; J. Shin, A. Ramdas & A. Rinaldo, "E-detectors", 2023).
+
+An alarm stands as it was raised. What changed, how and since when is told anew with every run that follows up
+to the next change: two runs hardly tell a step from a ramp.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,7 +43,7 @@ _FEW_RUNS = 64
 
 @dataclass(frozen=True)
 class Change:
-    """An alarm: a figure of a unit's runs changed.
+    """An alarm: a figure of a unit's runs changed, as the runs between its neighbours tell it.
 
     Attributes
     ----------
@@ -57,7 +60,9 @@ class Change:
         How far a step goes in the figure's unit, or what a ramp adds per unit of age: median and interval of
         Student's t by least squares for each run that it may have begun with, in proportion to probabilities.
     statistic
-        Sum of the evidences, against the limit.
+        Sum of the evidences when it was raised, against the limit.
+    latest_statistic
+        The same with the runs since.
     probability
         Of this figure and shape among all.
     """
@@ -70,6 +75,7 @@ class Change:
     size: float
     size_ci90: tuple[float, float]
     statistic: float
+    latest_statistic: float
     probability: float
 
 
@@ -137,32 +143,53 @@ def change_chart(
     if not runs_between_false_alarms >= 1.0:
         raise InputError(f"{runs_between_false_alarms} runs between false alarms: at least 1 is needed")
     statistic = np.zeros(len(age))
-    changes: list[Change] = []
-    first = place = 0
-    stop = _FEW_RUNS
-    while place < len(age):
-        # Not all runs at once, as those after an alarm are judged anew.
-        charts = {
+
+    def evidence(first: int, stop: int) -> dict[str, FigureEvidence]:
+        """Of runs from `first` on, `stop` left out."""
+        return {
             name: FigureEvidence(
                 values[:stop], age[:stop], first, prior, _until((errors or {}).get(name), stop)
             )
             for name, values in figures.items()
         }
+
+    raised: list[tuple[int, Change]] = []
+    first = place = 0
+    stop = _FEW_RUNS
+    while place < len(age):
+        # Not all runs at once, as those after an alarm are judged anew.
+        charts = evidence(first, stop)
         while place < min(stop, len(age)):
-            for one in charts.values():
-                one.go_to(place)
-            logs = {name: one.logs - np.log(len(figures)) for name, one in charts.items() if len(one.logs)}
-            total = np.logaddexp.reduce([part for one in logs.values() for part in one.ravel()] or [-np.inf])
-            statistic[place] = np.exp(min(total, 700.0))
+            logs, statistic[place] = _statistic(charts, place)
             place += 1
             if statistic[place - 1] >= runs_between_false_alarms:
-                changes.append(_change(charts, logs, place - 1, statistic[place - 1]))
-                first = max(changes[-1].onset, first + 1)
+                raised.append((first, _change(charts, logs, place - 1, statistic[place - 1])))
+                first = max(raised[-1][1].onset, first + 1)
                 stop = place + _FEW_RUNS
                 break
         else:
             stop = 2 * stop
+    nexts = [change.onset for _, change in raised[1:]]
+    changes = []
+    for (begin, change), end in zip(raised, [*nexts, len(age)]):
+        # More runs than are judged at first tell no more of what changed.
+        end = min(end, change.raised_at + _FEW_RUNS)
+        if end > change.raised_at + 1:
+            charts = evidence(begin, end)
+            logs, latest = _statistic(charts, end - 1)
+            told = _change(charts, logs, change.raised_at, change.statistic)
+            change = replace(told, latest_statistic=latest)
+        changes.append(change)
     return Chart(statistic, tuple(changes))
+
+
+def _statistic(charts: Mapping[str, FigureEvidence], place: int) -> tuple[dict[str, FloatArray], float]:
+    """Log evidences up to the run with index `place`, by figure, and their sum."""
+    for one in charts.values():
+        one.go_to(place)
+    logs = {name: one.logs - np.log(len(charts)) for name, one in charts.items() if len(one.logs)}
+    total = np.logaddexp.reduce([part for one in logs.values() for part in one.ravel()] or [-np.inf])
+    return logs, float(np.exp(min(total, 700.0)))
 
 
 def _until(values: FloatArray | None, stop: int) -> FloatArray | None:
@@ -184,7 +211,7 @@ def _change(
     best = int(np.argmax(shares))
     likely = np.argsort(-shares)
     held = likely[: int(np.searchsorted(np.cumsum(shares[likely]), LEVEL)) + 1]
-    median, *ends = (chart.size_quantile(level, s, shares) for level in (0.5, *TAILS))
+    median, *ends = chart.size_quantiles((0.5, *TAILS), s)
     return Change(
         raised_at=place,
         onset=chart.onset(best),
@@ -194,5 +221,6 @@ def _change(
         size=median,
         size_ci90=(ends[0], ends[1]),
         statistic=float(statistic),
+        latest_statistic=float(statistic),
         probability=float(np.exp(mass[name, s] - np.logaddexp.reduce(list(mass.values())))),
     )

@@ -43,7 +43,8 @@ class ChangePrior:
         Slowest flicker, in mean intervals between the baseline's runs.
     confirming_runs
         Runs that have to show a change, the one it begins with among them: one alone may be an outlier, of
-        which the normal distribution knows nothing.
+        which the normal distribution knows nothing. A change that the runs do not speak for without the last
+        of these counts no more than one that nothing is known of.
     """
 
     baseline_runs: int = 3
@@ -163,7 +164,6 @@ class FigureEvidence:
         sizes = np.tile(self._sizes, (n - start, 1))
         valid = np.repeat(np.arange(start, n), len(SHAPES))
         self._all = np.full(columns.shape, -np.inf)
-        best, self._best = np.full(n, -np.inf), np.zeros(n, dtype=np.intp)
         for model in range(len(plain)):
             z, _ = self._whitened(model, np.column_stack((pair, columns)))
             ones, about = _about(z[:, :2])
@@ -188,9 +188,6 @@ class FigureEvidence:
                     ratios = weights[model, rows, None] - 0.5 * np.log(wide) - freedom * np.log1p(-gained)
                     ratios[later] = -np.inf
                     self._all[rows, known] = np.logaddexp(self._all[rows, known], ratios)
-                    greatest = ratios.max(axis=1)
-                    self._best[rows][greatest > best[rows]] = model
-                    best[rows] = np.maximum(best[rows], greatest)
         self._all -= np.log(self._sizes.size)
         self._all[silent] = -np.inf
 
@@ -205,32 +202,56 @@ class FigureEvidence:
         self._done = int(np.searchsorted(self._rows, place, side="right"))
         onsets = self._done - self._baseline - self._unconfirmed
         if onsets > 0:
-            self.logs = self._all[self._done - 1, : len(SHAPES) * onsets].reshape(-1, len(SHAPES))
+            known = slice(0, len(SHAPES) * onsets)
+            logs = self._all[self._done - 1, known]
+            before = self._all[self._done - 1 - self._unconfirmed : self._done - 1, known]
+            if len(before):
+                logs = np.where(before.min(axis=0) > 0.0, logs, np.minimum(logs, 0.0))
+            self.logs = logs.reshape(-1, len(SHAPES))
 
     def onset(self, change: int) -> int:
         """Index of the run that a change begins with."""
         return int(self._rows[self._baseline + change])
 
-    def size_quantile(self, level: float, shape: int, shares: FloatArray) -> float:
-        """Quantile of a change's size, whose onset has the probabilities `shares`, shape (m,)."""
-        n, onsets = self._done, np.flatnonzero(shares)
-        table = np.column_stack((self._y, np.ones(len(self._y)), self._columns()))
-        whitened = self._whitened(int(self._best[n - 1]), table)[0][:n]
-        # A line through whitened runs: of each column and of the values what is left beside the mean.
-        mean = whitened[:, 1] / np.linalg.norm(whitened[:, 1])
-        left = whitened - np.outer(mean, mean @ whitened)
-        columns, y = left[:, 2 + len(SHAPES) * onsets + shape], left[:, 0]
+    def size_quantiles(self, levels: tuple[float, ...], shape: int) -> list[float]:
+        """Quantiles of a change's size: for each covariance and each onset by least squares, weighed."""
+        n = self._done
+        onsets = np.arange(self._baseline, n - self._unconfirmed)
+        columns = self._shape(onsets, shape)
         if shape == 1 and np.ptp(self._age[:n]) > 0.0:
-            columns *= np.ptp(self._age[:n]) / np.ptp(self._t[:n])
-        lengths = np.linalg.norm(columns, axis=0)
-        told = lengths > 1e-9 * np.linalg.norm(whitened[:, 2 + len(SHAPES) * onsets + shape], axis=0)
-        if not told.any():
-            return 0.0 if level == 0.5 else float(np.copysign(np.inf, level - 0.5))
-        columns, lengths, weights = columns[:, told], lengths[told], shares[onsets[told]]
-        sizes = y @ columns / lengths**2
-        scales = np.linalg.norm(y[:, None] - columns * sizes, axis=0) / np.sqrt(n - 2) / lengths
+            unit = float(np.ptp(self._age[:n]) / np.ptp(self._t[:n]))
+        else:
+            unit = 1.0
+        table = np.column_stack((self._y, np.ones(len(self._y)), columns))
+        parts = []
+        for model in range(len(self._wander)):
+            z, log_dets = self._whitened(model, table)
+            z = z[:n]
+            # A line through whitened runs: of each column and of the values what is left beside the mean.
+            length = np.linalg.norm(z[:, 1])
+            mean = z[:, 1] / length
+            left = z - np.outer(mean, mean @ z)
+            y, x = left[:, 0], left[:, 2:]
+            about, v = float(y @ y), np.sum(x**2, axis=0)
+            told = v > 1e-18 * np.sum(z[:, 2:] ** 2, axis=0)
+            if not told.any() or not about > 0.0:
+                continue
+            v, products = v[told], y @ x[:, told]
+            sizes = products / v
+            residual = np.maximum(about - products * sizes, 0.0)
+            wide = 1.0 + self._sizes[shape][:, None] * v
+            gained = np.minimum(self._sizes[shape][:, None] * products**2 / about / wide, 1.0 - 1e-15)
+            logs = np.logaddexp.reduce(-0.5 * np.log(wide) - 0.5 * (n - 1) * np.log1p(-gained))
+            plain = -log_dets[n - 1] - np.log(length) - 0.5 * (n - 1) * np.log(about)
+            parts.append((logs + plain, sizes, np.sqrt(residual / (n - 2) / v)))
+        if not parts:
+            return [0.0 if level == 0.5 else float(np.copysign(np.inf, level - 0.5)) for level in levels]
+        logs, sizes, scales = (np.concatenate(part) for part in zip(*parts))
         scales = np.maximum(scales, np.spacing(np.abs(sizes)))
-        return students_ppf(level, weights / weights.sum(), sizes, scales, n - 2)
+        shares = np.exp(logs - np.logaddexp.reduce(logs))
+        kept = shares > 1e-12
+        found = students_ppf(levels, shares[kept] / shares[kept].sum(), sizes[kept], scales[kept], n - 2)
+        return [float(value) / unit for value in found]
 
 
 def _about(z: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -46,11 +46,11 @@ def monitor_json(
         "runs": {"added": added, "repeated": repeated},
         "refused": [{"run": run, "reason": reason} for run, reason in (refused or {}).items()],
         "figures": dict(FIGURES),
-        "units": [_unit(unit) for unit in units],
+        "units": [_unit(unit, runs_between_false_alarms) for unit in units],
     }
 
 
-def _unit(unit: UnitWatch) -> dict[str, Any]:
+def _unit(unit: UnitWatch, limit: float) -> dict[str, Any]:
     return {
         "unit": unit.unit,
         "axis": unit.axis,
@@ -59,13 +59,13 @@ def _unit(unit: UnitWatch) -> dict[str, Any]:
         "age": unit.age.tolist(),
         "runs": [asdict(record) for record in unit.records],
         "statistic": unit.chart.statistic.tolist(),
-        "alarms": [_alarm(unit, change) for change in unit.chart.changes],
+        "alarms": [_alarm(unit, change, limit) for change in unit.chart.changes],
         "calibration": None if unit.calibration is None else _calibration(unit.calibration),
         "notes": list(unit.notes),
     }
 
 
-def _alarm(unit: UnitWatch, change: Change) -> dict[str, Any]:
+def _alarm(unit: UnitWatch, change: Change, limit: float) -> dict[str, Any]:
     age, runs = unit.age, unit.records
     first, last = change.onset_ci90
     per = "" if change.shape == "step" else f" per {'day' if unit.dated else 'run'}"
@@ -78,6 +78,8 @@ def _alarm(unit: UnitWatch, change: Change) -> dict[str, Any]:
         "onset_age": float(age[change.onset]),
         "onset_ci90": [runs[first].run, runs[last].run],
         "statistic": change.statistic,
+        "latest_statistic": change.latest_statistic,
+        "stands": change.latest_statistic >= limit,
         "figure": change.figure,
         "shape": change.shape,
         "probability": change.probability,

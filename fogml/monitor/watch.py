@@ -16,19 +16,23 @@ from fogml.intervals import TAILS
 from fogml.monitor.changes import Chart, Shape, change_chart
 from fogml.monitor.evidence import ChangePrior, flicker_covariance
 from fogml.monitor.record import FIGURES, RunRecord
-from fogml.signals.distributions import students_ppf
+from fogml.signals.distributions import student_ppf, students_ppf
 from fogml.signals.restricted import absent_or_not, weighed_models
 
-_RATIOS = np.concatenate(([0.0], 4.0 ** np.arange(-3.0, 4.0)))
+_RATIOS = np.concatenate(([0.0], 8.0 ** np.arange(-3.0, 4.0)))
 """Variance of flicker in a factor e of time, or of a walk from run to run, in that of the white part."""
 
 
-def trend_quantiles(age: FloatArray, values: FloatArray, probabilities: tuple[float, ...]) -> list[float]:
-    """Quantiles of the slope of a line through the values, in their unit per unit of age.
+def trend_interval(
+    age: FloatArray, values: FloatArray, *, wanders: bool = True
+) -> tuple[float, tuple[float, float]]:
+    """Slope of a line through the values, in their unit per unit of age, and its interval at `LEVEL`.
 
-    White noise, flicker and a random walk between the runs are averaged over by restricted likelihood, either
-    of the latter being as likely there as not. A few runs hardly tell a trend from a walk, and the interval
-    says so.
+    Between the runs there may be flicker and a random walk beside white noise, of any size. A few runs hardly
+    tell a trend from a walk, and an average over what they may be would hold too seldom where they do walk.
+    So the interval is that of the profile likelihood, restricted as the line's constants are unknown: every
+    slope that some noise makes as likely as the interval's ends are under noise that is known. There it is
+    Student's t.
 
     Parameters
     ----------
@@ -36,20 +40,38 @@ def trend_quantiles(age: FloatArray, values: FloatArray, probabilities: tuple[fl
         Age at each run, not all the same, shape (n,), n over 2.
     values
         The figure, shape (n,).
-    probabilities
-        Of the quantiles.
+    wanders
+        Whether it may wander between the runs; without, noise between them is white.
+
+    Returns
+    -------
+    slope, ci90
+        Median over the noises by their likelihoods, either part being as likely there as not; and the
+        interval.
     """
-    t = (age - age[0]) * ((len(age) - 1) / float(np.ptp(age)))
-    ratios = np.array(list(product(_RATIOS, repeat=2)))
+    n = len(age)
+    t = (age - age[0]) * ((n - 1) / float(np.ptp(age)))
+    ratios = np.array(list(product(_RATIOS if wanders else _RATIOS[:1], repeat=2)))
     parts = np.stack((flicker_covariance(t, ChangePrior().longest_wander), np.minimum(t[:, None], t)))
+    before = absent_or_not(ratios)
     models = weighed_models(
-        np.eye(len(age)) + np.tensordot(ratios, parts, 1),
-        np.column_stack((np.ones(len(age)), age - age.mean())),
+        np.eye(n) + np.tensordot(ratios, parts, 1),
+        np.column_stack((np.ones(n), age - age.mean())),
         values - values.mean(),
-        absent_or_not(ratios),
+        before,
     )
-    found = students_ppf(probabilities, models.weights, models.constants, models.scales, models.freedom)
-    return [float(value) for value in found]
+    slopes, scales, freedom = models.constants, models.scales, models.freedom
+    median = float(students_ppf(0.5, models.weights, slopes, scales, freedom))
+    with np.errstate(divide="ignore"):
+        likelihood = np.log(models.weights) - before
+    # Student's t at its own quantile is so much less likely than in its middle.
+    allowed = 0.5 * (freedom + 1.0) * np.log1p(student_ppf(TAILS[1], freedom) ** 2 / freedom)
+    left = likelihood - likelihood.max() + allowed
+    reach = np.sqrt(freedom * np.expm1(2.0 * np.maximum(left, 0.0) / (freedom + 1.0))) * scales
+    low, high = (
+        float(end) for end in ((slopes - reach)[left >= 0.0].min(), (slopes + reach)[left >= 0.0].max())
+    )
+    return median, (low, high)
 
 
 DAY_S = 86400.0
@@ -85,7 +107,7 @@ class Calibration:
         Greatest change of the level [deg/h].
     trend, trend_ci90
         The level's slope over the runs since the last change [deg/h per day], median and interval, a bias
-        that wanders between the runs being allowed for.
+        that wanders between the runs being allowed for unless it is known not to.
     due_days, due_ci90
         Days from the last run until the level's change passes the limit: most likely, and the interval that
         holds it with 90 %; infinite where it does not within a hundred years.
@@ -220,7 +242,9 @@ def _watched(
         dated=dated,
         chart=chart,
         state=state,
-        calibration=_calibration(age[first:], figures["level"][first:], bias_limit or last.half_width)
+        calibration=_calibration(
+            age[first:], figures["level"][first:], bias_limit or last.half_width, any(prior.wander)
+        )
         if dated
         else None,
         notes=tuple(notes),
@@ -252,12 +276,12 @@ def _in_order(records: Sequence[RunRecord]) -> tuple[list[RunRecord], FloatArray
     return placed, np.array([(moments[r.key] - first).total_seconds() / DAY_S for r in placed]), True
 
 
-def _calibration(age: FloatArray, level: FloatArray, limit: float) -> Calibration | None:
+def _calibration(age: FloatArray, level: FloatArray, limit: float, wanders: bool) -> Calibration | None:
     """When a line through the levels passes a limit; None for fewer than four runs."""
     n = len(age)
     if n < 4 or not np.ptp(age) > 0.0:
         return None
-    low, trend, high = trend_quantiles(age, level, (TAILS[0], 0.5, TAILS[1]))
+    trend, (low, high) = trend_interval(age, level, wanders=wanders)
 
     def due(slope: float) -> float:
         """Days from the last run until a line of that slope has gone as far as the limit."""

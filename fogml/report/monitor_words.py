@@ -57,9 +57,11 @@ def alarm_words(alarm: Mapping[str, Any]) -> str:
         how = f"drifts by {number(size)} {alarm['unit']} (90 %: {_interval(low, high)})"
     first, last = alarm["onset_ci90"]
     between = "" if first == last else f", with 90 % between {first} and {last}"
+    told = f" With the runs since the evidence is down to {number(alarm['latest_statistic'])}."
+    doubt = "" if alarm["stands"] else told
     return (
         f"The {figure} {how} since {onset_words(alarm)} ({alarm['onset']}{between}); noticed with "
-        f"{alarm['raised_at']}. Effects that do so: {', '.join(alarm['nearest'])}."
+        f"{alarm['raised_at']}.{doubt} Effects that do so: {', '.join(alarm['nearest'])}."
     )
 
 

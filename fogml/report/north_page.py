@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from fogml.numerals import MISSING, duration, listed, number, stated, to_error
+from fogml.numerals import MISSING, duration, listed, number, percent, stated, to_error
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import Row, Table, noticed
@@ -45,7 +45,10 @@ def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
     sentences = [f"The azimuth is {to_error(values['azimuth_deg'], values['se'])}{within} deg."]
     drift = values["drift_deg_h_per_h"]
     if values["method"] != "plain":
+        share = values.get("bend_probability")
         bent = ", and its bend," if values["method"] == "bend-observing" else ""
+        if share is not None:
+            bent = f", and by {percent(share, 0)} its bend, as probable as that is,"
         sentences.append(
             f"A linear drift of {number(drift)} ± {number(values['drift_se'], 2)} deg/h "
             f"per h{bent} is taken out; a plain seek is {number(values['error_deg'])} deg from this one."
@@ -53,7 +56,8 @@ def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
     elif drift is not None:
         sentences.append("The standard error of a plain seek holds only where the bias does not drift.")
     if values["se"] is not None:
-        bends = "" if values["method"] == "bend-observing" else "a bias that bends, as at start-up, and "
+        held = values["method"] in ("bend-observing", "averaged")
+        bends = "" if held else "a bias that bends, as at start-up, and "
         sentences.append(
             "The standard error is of the gyro's noise, flicker and random walk as the stays tell them; it "
             f"does not hold {bends}errors of the table's angles and level."

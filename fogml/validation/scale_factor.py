@@ -22,6 +22,7 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.run import Run
 from fogml.runs.transitions import find_transitions, transition_mask
 from fogml.runs.turning import least_rate_deg_s
+from fogml.signals.clock import gap_starts, longest_gap_s
 from fogml.signals.distributions import student_ppf
 
 SAME_SHARE = 1e-3
@@ -227,14 +228,16 @@ def find_steps(run: Run, full: BoolArray) -> Steps | None:
     usable = np.flatnonzero(full & ~transition_mask(run))
     # Ramps of the table give several transitions with no usable row between: those plateaus are
     # empty and fall out here.
-    cuts = np.union1d(transitions, run.gap_starts)
+    # Rows that are lost at random part no piece, as they part no window of averages.
+    gaps = gap_starts(run.time, run.sample_s, longest_gap_s(LONGEST_PIECE_S, run.sample_s))
+    cuts = np.union1d(transitions, gaps)
     edges = np.unique(np.searchsorted(usable, cuts))
     edges = np.concatenate(([0], edges[(edges > 0) & (edges < len(usable))], [len(usable)]))
     if len(edges) < 3:
         return None
     time = run.time[usable]
     reference = 3600.0 * run.rate[usable]
-    gap_before = np.isin(edges[1:-1], np.searchsorted(usable, run.gap_starts))
+    gap_before = np.isin(edges[1:-1], np.searchsorted(usable, gaps))
     means = np.add.reduceat(reference, edges[:-1]) / np.diff(edges)
     before, after, levels, at_rest = [], [], [], []
     # The table is at rest, or turns: every level that differs from the one before counts, however slow.

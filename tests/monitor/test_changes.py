@@ -136,6 +136,42 @@ def test_a_step_is_found_where_it_is(size):
     assert np.median(delay) <= (6 if size == 4.0 else 1)
 
 
+def test_what_changed_is_told_by_the_runs_since_and_the_alarm_stands_as_it_was_raised():
+    ages, at_once, since = np.arange(30.0), [], []
+    for seed in range(20):
+        rng = np.random.default_rng([5, seed])
+        errors = 0.5 * np.exp(0.3 * rng.normal(size=30))
+        level = np.hypot(1.0, errors) * rng.normal(size=30) + 6.0 * (ages >= 16.0)
+        told = change_chart({"level": level}, ages, 300.0, errors={"level": errors}).changes[0]
+        stop = told.raised_at + 1
+        cut = {"level": level[:stop]}
+        first = change_chart(cut, ages[:stop], 300.0, errors={"level": errors[:stop]}).changes[0]
+        assert (first.raised_at, first.statistic) == (told.raised_at, pytest.approx(told.statistic, rel=1e-9))
+        at_once.append((first.shape == "step", first.size - 6.0))
+        since.append((told.shape == "step", told.size - 6.0))
+        assert told.size_ci90[1] - told.size_ci90[0] < first.size_ci90[1] - first.size_ci90[0]
+    assert all(step for step, _ in since)
+    rms = [np.sqrt(np.mean([off**2 for step, off in told if step])) for told in (at_once, since)]
+    assert rms[1] < 0.6 and rms[1] < 0.7 * rms[0]
+
+
+@pytest.mark.parametrize("far_off", [1, 2])
+def test_a_run_that_is_far_off_raises_no_alarm_and_after_two_the_alarm_does_not_stand(far_off):
+    raised, latest = [], []
+    for seed in range(15):
+        level = np.random.default_rng([9, seed]).normal(size=26)
+        level[20 : 20 + far_off] += 12.0
+        errors = {"level": np.full(26, 0.3)}
+        changes = change_chart({"level": level}, np.arange(26.0), 300.0, errors=errors).changes
+        raised += [change.raised_at for change in changes]
+        latest += [change.latest_statistic for change in changes]
+    if far_off == 1:
+        assert not raised  # as a ramp that begins with the run before it, four of these
+    else:
+        # Without a change the evidence is the number of runs, or less.
+        assert raised.count(21) >= 13 and np.median(latest) < 26.0
+
+
 def test_where_nothing_wanders_small_steps_are_found_and_where_it_does_alarms_are_raised():
     rng = np.random.default_rng(6)
     found = dict.fromkeys(("step", "step, steady", "wandering, steady"), 0)
@@ -188,7 +224,7 @@ def test_what_is_wrong_is_said():
 
 
 def test_an_onset_is_one_of_the_fewest_that_hold_nine_tenths():
-    chart = SimpleNamespace(onset=lambda place: place, size_quantile=lambda level, shape, shares: level)
+    chart = SimpleNamespace(onset=lambda place: place, size_quantiles=lambda levels, shape: levels)
     shares = np.array([0.05, 0.5, 0.41, 0.03, 0.01])
     logs = {"bias": np.log(np.column_stack([shares, 1e-3 * shares]))}
     found = _change({"bias": chart}, logs, 9, 2000.0)
