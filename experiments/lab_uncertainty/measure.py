@@ -40,7 +40,7 @@ def wilson(part: int, whole: int, z: float = 1.96) -> tuple[float, float]:
     share = part / whole
     middle = (share + z * z / (2.0 * whole)) / (1.0 + z * z / whole)
     half = z / (1.0 + z * z / whole) * np.sqrt(share * (1.0 - share) / whole + (z / (2.0 * whole)) ** 2)
-    return float(middle - half), float(middle + half)
+    return max(float(middle - half), 0.0), float(middle + half)
 
 
 def coverage(case: str, quantity: str, told: Iterable[Told | None]) -> dict[str, Any]:

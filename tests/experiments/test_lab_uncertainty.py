@@ -7,7 +7,7 @@ import pytest
 
 from experiments.lab_uncertainty import __main__ as lab_uncertainty
 from experiments.lab_uncertainty import certificates, north, planning, rate
-from experiments.lab_uncertainty.measure import Told, coverage, wilson
+from experiments.lab_uncertainty.measure import Told, coverage, of_interval, wilson
 from experiments.lab_uncertainty.signals import Noise, flicker, lagged
 
 
@@ -38,6 +38,9 @@ def test_a_lag_is_that_of_its_closed_form() -> None:
 def test_shares_and_their_intervals() -> None:
     row = coverage("a case", "a figure", [Told(1.0, 2.0), Told(-3.0, 2.0), Told(0.5, None), None])
     assert (row["runs"], row["stated"], row["held"]) == (4, 2, 0.5)
+    # An interval that is not even about the estimate holds what lies between its ends.
+    uneven = [of_interval(1.0, 1.4, (0.9, 1.5)), of_interval(1.0, 0.85, (0.9, 1.5))]
+    assert coverage("a case", "a figure", uneven)["held"] == 0.5
     # E. B. Wilson's interval of 90 of 100.
     assert wilson(90, 100) == pytest.approx((0.8256, 0.9448), abs=1e-4)
 
