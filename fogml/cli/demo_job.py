@@ -9,7 +9,6 @@ from fogml.cli.runs import open_runs
 from fogml.cli.settings import SHIPPED
 from fogml.cli.terminal import Terminal
 from fogml.cli.train_job import TrainSettings, fit_and_judge, say_advice, write_results
-from fogml.numerals import number, short
 from fogml.outputs import whole_folder
 from fogml.validation.judge import judge
 from fogml.validation.report_json import judgement_json
@@ -38,7 +37,7 @@ def demo_and_write(settings: DemoSettings, terminal: Terminal) -> None:
         page = index_page(judgements, title="A chamber cycle, three axes", beside={CUBIC: cubics})
         (folder / "index.html").write_text(page, encoding="utf-8")
         settings.write_into(folder, "demo")
-    _print(judgements, settings, terminal)
+    _print(judgements, cubics, settings, terminal)
     terminal.result(
         {
             "schema": "fogml.demo/1",
@@ -68,26 +67,16 @@ def _axis(folder: Path, axis: str, settings: DemoSettings, terminal: Terminal) -
     return judgement, judge(cubic, training, test, averaging_s=averaging_s, beside=[model])
 
 
-def _print(judgements: dict[str, Judgement], settings: DemoSettings, terminal: Terminal) -> None:
-    rows = []
-    for axis, judgement in judgements.items():
-        run = judgement.test[0]
-        nothing = any(note.startswith("no compensation") for note in judgement.model["notes"])
-        model = "no compensation" if nothing else ", ".join(judgement.model["features"])
-        figures = (
-            run.before.rms,
-            run.after.rms,
-            run.before.bias_stability,
-            run.after.bias_stability,
-            run.floor,
-        )
-        rows.append([axis, *(number(value) for value in figures), model])
-    averaging = judgements[AXES[0]].test[0].averaging_s
-    terminal.table(
-        f"A MEMS unit, trained going up, judged going down ({short(averaging)} s averages, deg/h)",
-        ["axis", "rms before", "after", "bias stability before", "after", "noise floor", "features chosen"],
-        rows,
-    )
+def _print(
+    judgements: dict[str, Judgement],
+    cubics: dict[str, Judgement],
+    settings: DemoSettings,
+    terminal: Terminal,
+) -> None:
+    from fogml.report.index_page import axes_table
+
+    title = "A MEMS unit, trained going up, judged going down"
+    terminal.show(axes_table(judgements, {CUBIC: cubics}), title)
     for axis, judgement in judgements.items():
         say_advice(judgement, terminal, f"Axis {axis}: ")
     for axis, judgement in judgements.items():

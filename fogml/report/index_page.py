@@ -67,7 +67,7 @@ def index_page(
             AxisLink(axis, links[axis], _words(judgement), advice_words(advice_on(judgement)))
             for axis, judgement in judgements.items()
         ],
-        table=_table(judgements, beside or {}, found),
+        table=axes_table(judgements, beside or {}),
         drawing=loops(judgements),
         notes=list(told),
     )
@@ -106,21 +106,18 @@ def _words(judgement: Judgement) -> str:
     )
 
 
-def _table(
-    judgements: Mapping[str, Judgement],
-    beside: Mapping[str, Mapping[str, Judgement]],
-    found: Mapping[str, Loop | None],
-) -> Table:
+def axes_table(judgements: Mapping[str, Judgement], beside: Mapping[str, Mapping[str, Judgement]]) -> Table:
+    """Each axis' worst test run before and after, by its model and by those beside it."""
     rows = []
     for axis, judgement in judgements.items():
-        worst, loop = worst_run(judgement.test), found[axis]
+        worst, loop = worst_run(judgement.test), _loop(judgement)
         others = [
             number(worst_run(by_axis[axis].test).after.rms) if axis in by_axis else MISSING
             for by_axis in beside.values()
         ]
         rows.append(
             (
-                f"axis {axis}",
+                axis,
                 str(judgement.model.get("kind")),
                 number(worst.before.rms),
                 *others,
