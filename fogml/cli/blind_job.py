@@ -13,7 +13,6 @@ from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSetti
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError, counted
 from fogml.json_files import write_json
-from fogml.numerals import short
 from fogml.outputs import folder_to_fill, whole_file, whole_folder
 
 if TYPE_CHECKING:
@@ -231,18 +230,11 @@ def _tell(out: Path, values: dict[str, Any], judged: str, terminal: Terminal) ->
 
 
 def _print(values: dict[str, Any], method: str, terminal: Terminal) -> None:
-    from fogml.report.blind_tables import by_reality_table, figure_text, wanted_text
+    from fogml.report.blind_page import figures_table, gates_table
+    from fogml.report.blind_tables import by_reality_table
 
     wanted = by_reality_table(values["methods"][method]["by_reality"])
     terminal.show(wanted, f"{method}: what is wanted, by reality")
-    rows = [
-        [row["words"], figure_text(row), wanted_text(row), str(row["n"])]
-        for row in values["methods"][method]["rows"]
-    ]
-    title = f"{method}: {values['cases']} blind cases (synthetic), seed {values['seed']}"
-    terminal.table(title, ["figure", "reached", "wanted", "n"], rows)
-    for one in values["gates"]:
-        bound = "at least" if one["at_least"] else "at most"
-        value = "no value" if one["value"] is None else short(one["value"], 4)
-        outcome = "met" if one["met"] else "NOT met"
-        terminal.say(f"gate {one['key']}: {value}, {bound} {one['limit']:g}: {outcome}")
+    figures = figures_table(values["methods"][method]["rows"], values)
+    terminal.show(figures, f"{method}: {values['cases']} blind cases (synthetic), seed {values['seed']}")
+    terminal.show(gates_table(values["gates"]), "Gates")

@@ -44,7 +44,7 @@ def blind_page(values: Mapping[str, Any]) -> str:
         warnings=_warnings(rows, values, judged),
         by_reality=by_reality_table(judged["by_reality"]),
         by_form=by_form_table(judged["by_form"]) if judged["by_form"] else None,
-        figures=_figures(rows, values),
+        figures=figures_table(rows, values),
         others=_others(methods, name) if len(methods) > 1 else None,
         by_kind=Table("Kind | >Cases", ((kind_words(kind), str(n)) for kind, n in values["kinds"].items())),
         strata=_strata(rows),
@@ -54,7 +54,7 @@ def blind_page(values: Mapping[str, Any]) -> str:
         confusion=confusion_plot(judged["confusion"]) if judged["confusion"]["true"] else None,
         left_out=_left_out(judged["left_out"]) if judged["left_out"] else None,
         worst=_worst(judged["worst"]),
-        gates=_gates(values["gates"]) if values["gates"] else None,
+        gates=gates_table(values["gates"]),
         uses=_uses(values["final_uses"]) if values["final_uses"] else None,
         suite_parts=_parts(values["parts"]) if len(values["parts"]) > 1 else None,
         about=_about(values),
@@ -96,7 +96,8 @@ def _warnings(
     return found
 
 
-def _figures(rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Table:
+def figures_table(rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Table:
+    """A method's figures with what is wanted of them."""
     caption = "n is what a figure rests on: cases, named effects, listed effects or intervals."
     if 0 < values["mix"] < values["cases"]:
         caption += (
@@ -212,7 +213,10 @@ def _worst(cases: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
     return told
 
 
-def _gates(gates: Sequence[Mapping[str, Any]]) -> Table:
+def gates_table(gates: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Which gates are met; None where there are none."""
+    if not gates:
+        return None
     return Table(
         "Gate | >Limit | >Reached | Outcome",
         (
