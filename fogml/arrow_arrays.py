@@ -11,6 +11,19 @@ if TYPE_CHECKING:
     from pyarrow import Array, ChunkedArray, Table
 
 
+BLOCK_BYTES = 1 << 20
+"""What Arrow parses in one piece of a text, its default."""
+
+
+def takes_threads(content: bytes | memoryview) -> bool:
+    """Whether a text is to be read on all cores: one block of Arrow's has little to share among them.
+
+    Threads that have only just done their part are a danger at a program's end, which a small file soon
+    meets: at times Arrow's teardown aborts the process then (https://github.com/apache/arrow/issues/34314).
+    """
+    return len(content) > BLOCK_BYTES
+
+
 def values_of(column: Array | ChunkedArray) -> np.ndarray[tuple[int], np.dtype[Any]]:
     """Numbers or truth values of an Arrow array, shape (n,), copied; a missing one is NaN.
 

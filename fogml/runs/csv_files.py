@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fogml.arrow_arrays import values_of
+from fogml.arrow_arrays import takes_threads, values_of
 from fogml.errors import InputError
 from fogml.runs.csv_dialect import CsvDialect, csv_dialect
 from fogml.runs.csv_lines import LineReader, cut_error, cut_line, line_of_row, note_of_end, without_footer
@@ -143,6 +143,7 @@ def _batches(dialect: CsvDialect) -> Iterator[RecordBatch]:
             raise _for_line_by_line("quotation marks that the fast parser reads otherwise")
         if _NO_BLANK.search(part):
             options = _options(dialect, skipped)
+            options["read_options"].use_threads = takes_threads(part)
             yield from arrow_csv.read_csv(arrow.BufferReader(part), **options).to_batches()
             skipped = 0
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray, IndexArray
-from fogml.arrow_arrays import values_of
+from fogml.arrow_arrays import takes_threads, values_of
 from fogml.errors import InputError, counted, quoted
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.raw_table import empty_file
@@ -207,7 +207,7 @@ def _fields(
     wanted = [names[position] for position in positions]
     return csv.read_csv(
         pa.BufferReader(content),
-        csv.ReadOptions(column_names=names),
+        csv.ReadOptions(column_names=names, use_threads=takes_threads(content)),
         # A mark that is not closed must not swallow the lines below it.
         csv.ParseOptions(delimiter=separator, quote_char=False, ignore_empty_lines=False),
         csv.ConvertOptions(
