@@ -133,8 +133,8 @@ def lag_of(runs: Sequence[Run], rows: int = Asked.rows, steps: int = 12) -> Lag 
     except (InputError, ValueError):
         return None
     low, high = table.X.min(), table.X.max()
-    if len(table) < 8 * (_DEGREE + len(runs)) or not high > low:
-        return None
+    if len(table) < 8 * (_DEGREE + len(runs)) or not high > low or not np.ptp(table.y) > 0.0:
+        return None  # too short, or one of the two stands still
     table = replace(table, X=(table.X - (low + high) / 2.0) / ((high - low) / 2.0))
     longest_s = max(float(np.ptp(table.time_s[table.run_index == r])) for r in range(len(runs)))
     grid = np.geomspace(averaging_s, longest_s / 6.0, 24)

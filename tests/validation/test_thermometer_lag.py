@@ -99,3 +99,11 @@ def test_another_drift_is_no_lag(drift: Drift, at: str) -> None:
 def test_runs_without_a_temperature_tell_none() -> None:
     run = Run("no temperature", {"time": np.arange(500.0), "gyro": np.zeros(500)})
     assert lag_note([run], [run]) is None
+
+
+def test_an_output_that_stands_still_follows_no_thermometer() -> None:
+    """A dead gyro's training ended with words on a noise model; its verdict says what is wrong."""
+    temperature = chamber(1.0, (-40.0, 90.0), (60.0, 90.0), (25.0, 45.0))
+    time = STEP_S * np.arange(len(temperature))
+    dead = Run.from_columns("dead", time=time, gyro=np.full(len(time), 10.0), T=temperature)
+    assert lag_note([dead], [dead]) is None
