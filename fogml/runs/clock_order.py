@@ -243,7 +243,7 @@ def _legs(clock: _Clock) -> list[slice] | None:
 def _sort(clock: _Clock, part: slice, count: int, row: int) -> None:
     order = part.start + np.argsort(clock.time[part], kind="stable")
     clock.rows[part], clock.time = clock.rows[order], _replaced(clock.time, part, clock.time[order])
-    told = f"rows are out of place, {count} times, first at {clock.row_name(row)}"
+    told = f"rows are out of place, {counted(count, 'time')}, first at {clock.row_name(row)}"
     clock.note("repaired_order", told, "sorts the rows", "sorted", row, count)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fogml.arrays import BoolArray, FloatArray
-from fogml.errors import InputError
+from fogml.errors import InputError, counted
 from fogml.numerals import percent
 from fogml.runs.run import Run
 from fogml.signals.averages import BlockAverages, block_averages, freedom_of_deviation
@@ -180,7 +180,8 @@ class RunMetrics:
         found = len(self.averages(self._time))
         if found < 2:
             raise InputError(
-                f"{run.name}: {used.sum()} usable rows give {found} averages over {averaging_s:g} s, at "
+                f"{run.name}: {counted(int(used.sum()), 'usable row')} give {counted(found, 'average')} "
+                f"over {averaging_s:g} s, at "
                 "least 2 are needed; choose a shorter --averaging or a longer run"
             )
 
