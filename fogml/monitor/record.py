@@ -21,7 +21,7 @@ from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
-from fogml.signals.averages import AVERAGING_S
+from fogml.signals.averages import AVERAGING_S, window_numbers
 
 FIGURES = {
     "level": "deg/h",
@@ -271,7 +271,7 @@ class _Means:
         if self.start is None:
             self.start = float(time[0])
             self.sample_s = float(np.median(np.diff(time))) if len(time) > 1 else self.window_s
-        window = np.floor((time[kept] - self.start) / self.window_s).astype(np.int64)
+        window = window_numbers(time[kept], self.start, self.sample_s, self.window_s).astype(np.int64)
         names, place = np.unique(window, return_inverse=True)
         counts: IntArray = np.bincount(place, minlength=len(names)).astype(np.int64)
         sums: dict[str, FloatArray] = {

@@ -51,9 +51,10 @@ class BlockAverages:
 def block_averages(time: ArrayLike, *columns: ArrayLike, window_s: float) -> BlockAverages:
     """Average columns over consecutive windows of `window_s` seconds.
 
-    Windows begin at the first sample of each stretch. A gap is an interval longer than 3 median sample
-    intervals. A gap longer than a quarter of the window cuts the series and the windows begin anew after it;
-    a shorter one is spanned.
+    Windows begin with the first sample of each stretch, half a sample interval before its time: edges lie
+    between samples, where times that are not quite even move none across. A gap is an interval longer than 3
+    median sample intervals. A gap longer than a quarter of the window cuts the series and the windows begin
+    anew after it; a shorter one is spanned.
     A window is kept if its samples cover at least half of it, from the first to the last of
     them plus one sample interval; so the rest at the end of a stretch is dropped if short.
     Takes O(n) time.
@@ -95,6 +96,13 @@ def block_averages(time: ArrayLike, *columns: ArrayLike, window_s: float) -> Blo
     )
 
 
+def window_numbers(
+    time: FloatArray, origin: FloatArray | float, sample_s: float, window_s: float
+) -> FloatArray:
+    """Which window each sample is in, shape (n,); the first begins with a sample at `origin`."""
+    return np.asarray(np.floor((time - origin + (0.5 + _ROUNDING) * sample_s) / window_s))
+
+
 def _windows(time: FloatArray, window_s: float) -> tuple[IndexArray, IndexArray]:
     """First and past-the-last samples of the windows that are at least half full."""
     if len(time) == 0:
@@ -106,7 +114,7 @@ def _windows(time: FloatArray, window_s: float) -> tuple[IndexArray, IndexArray]
     for part in large.pieces(time, overlap=1):
         rows = np.arange(part.start, part.stop)
         origin = time[edges[np.searchsorted(edges, rows, side="right") - 1]]
-        number = np.floor((time[part] - origin + _ROUNDING * sample_s) / window_s)
+        number = window_numbers(time[part], origin, sample_s, window_s)
         opens.append(part.start + np.flatnonzero(np.diff(number)) + 1)
     starts = np.unique(np.concatenate(opens))
     stops = np.append(starts[1:], len(time))
