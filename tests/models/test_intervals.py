@@ -141,4 +141,4 @@ def test_an_interval_of_many_hours_holds_averages_of_the_judgement(runs: int) ->
     averages = left[:count].reshape(-1, 5).mean(axis=1)
     half = float(model.intervals_.half_width(0.9))
     assert model.intervals_.averaging_s == 100.0
-    assert 0.85 < np.mean(np.abs(averages - averages.mean()) < half) < 0.995
+    assert np.mean(np.abs(averages - averages.mean()) < half) > 0.85 and half < 4.0 * averages.std()
