@@ -19,7 +19,7 @@ from fogml.gap.result_parts import CauseShare, HowFar
 from fogml.gap.rows import Rows
 from fogml.gap.where import averages
 from fogml.intervals import TAILS, Z90
-from fogml.numerals import short
+from fogml.numerals import listed, short
 from fogml.runs.regimes import Regimes
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
@@ -159,6 +159,12 @@ class HeldOut:
         models = [replace(m, N=as_much * m.N) for m in drawn]
         self._floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
         self._noises = self._drawn(model, None)
+        # Of what the twin has and each run draws anew a replay holds one deviation; the run has its own.
+        own = [(d, s) for d, s in found.plant.on if d.drawn_per_run]
+        made = [self.rows.made(d, s.amplitude, s.shape, found.setting.values) for d, s in own]
+        self._anew = [d.title for d, _ in own]
+        apart = self._rng.standard_normal((len(self._noises), len(own))) - 1.0
+        self._noises = self._noises + apart**2 @ np.array([_square(windows.of(m)) for m in made])
         self._loudest = float(self._noises.mean()) + Z90 * float(np.std(self._noises))
         level = self._recalibrated > self._loudest
         # Slow noise moves a run's mean more than its shape, which may show a gap where the level doesn't.
@@ -186,7 +192,10 @@ class HeldOut:
         left = self.rows.gap - after.on(self.run)
         aft = _square(windows.of(left))
         closed, interval, draws = None, None, self._settings.draws
-        note = "the recalibrated twin is at the floor within its noise: what is closed can't be told"
+        within = "at the floor within its noise"
+        if rec > floor and self._anew:
+            within = f"within noise and what is drawn anew on each run ({listed(self._anew)})"
+        note = f"the recalibrated twin is {within}: what is closed can't be told"
         if not self._at_floor:
             note = "" if aft <= rec else "the run is foretold worse with what was found than without"
             gap = rec - floor

@@ -56,6 +56,18 @@ def test_the_same_twin_with_its_own_sensors_leaves_no_gap(tactical, runs):
     assert max(errors) < 3.0
 
 
+def test_a_run_of_another_turn_on_bias_is_within_what_the_twin_draws(tactical):
+    bare = tactical.without_effect("turn_on_bias")
+    made = [_run(bare, seed) for seed in (1, 2, 3)]
+    # Half a deg/h more than in the runs before: one deviation of such a unit, and far beyond noise.
+    held = made[2].with_columns(gyro=made[2].gyro_deg_h + 0.5)
+    drawn = diagnose(TwinModel(bare.with_effect("turn_on_bias", 0.5)), made[:2], [held], plan=False)
+    steady = diagnose(TwinModel(bare), made[:2], [held], plan=False)
+    assert drawn.verdict == steady.verdict == "no_gap"
+    assert drawn.how_far[0].closed is None and "drawn anew on each run" in drawn.how_far[0].note
+    assert steady.how_far[0].closed is not None and "leaves" in steady.headline[0]
+
+
 def test_a_table_that_turns_all_the_time_makes_no_noise(tactical):
     # Scale factor off by 950 ppm: at turning rates that change from row to row, hundreds of times the noise.
     runs = [_run(tactical, seed) for seed in (1, 2)]
