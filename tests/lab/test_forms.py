@@ -57,8 +57,10 @@ def test_folds_find_the_true_form(several):
     assert [score.held_out_rms for score in ranked] == sorted(score.held_out_rms for score in ranked)
     chosen = smallest_within(ranked, 0.05)
     assert chosen.features == "T1^1..2, dT1, T2^1..2, dT2" and chosen.coefficients == 7
-    # What is held out is left with the noise.
-    assert chosen.held_out_rms == pytest.approx(0.01, rel=0.1)
+    # What is held out is left with the noise. Two runs are scored on 2500 windows of 14.4 s: of samples of
+    # 10 s 44 in 100 hold two, whose mean has half the variance.
+    noise = 0.01 * np.sqrt(1.0 - 0.44 / 2.0) if several else 0.01
+    assert chosen.held_out_rms == pytest.approx(noise, rel=0.05)
     missing = score_form("T3^1..2, dT3", runs)
     assert missing.held_out_rms > 10.0 * chosen.held_out_rms
 
