@@ -11,10 +11,10 @@ PAIRS = {
     "csv": "Ours parses by pyarrow, whose threads OMP_NUM_THREADS bounds, and then checks every value "
     "(missing, infinite, time going back, stuck values, saturation, outliers, thermometers that drop out, "
     "bursts of a logger, units that can't be): a third as much again, on one core. pandas 3.1 parses on all "
-    "cores, checks nothing, and keeps whole numbers as integers, which cost less to parse.",
+    "cores whatever OMP_NUM_THREADS says, checks nothing, and keeps whole numbers as integers, which cost less to parse.",
     "read-csv": "As for pandas: plain readers parse, and check nothing.",
     "read-csv-1e7": "Over 64 MB a file goes part by part into temporary files, so that its length does not "
-    "matter to memory; plain readers hold all of it. Parsing alone takes as long as pandas; what is read is "
+    "matter to memory; plain readers hold all of it, and pandas 3.1 parses on all cores; what is read is "
     "then looked through some 25 columns' worth out of these files, on one core.",
     "read-parquet": "Files of other formats than text are decoded in a process of its own, with limits on "
     "time and memory, so that a damaged or hostile one ends nothing else; samples pass through a pipe while "
@@ -27,6 +27,7 @@ PAIRS = {
     "write-parquet": "As much is encoded; ours writes a file that appears whole, and its facts.",
     "features": "The plain way keeps no mask of full windows, knows no gaps and assumes even sampling.",
     "allan": "The plain way gives no intervals.",
+    "compensate": "As fast as Arrow itself reads and writes the file, within chance.",
     "help": "The plain side prints no help.",
 }
 """Beginning of a job's name to the reason; the longest that fits counts."""
