@@ -11,7 +11,8 @@ PAIRS = {
     "csv": "Ours parses by pyarrow, whose threads OMP_NUM_THREADS bounds, and then checks every value "
     "(missing, infinite, time going back, stuck values, saturation, outliers, thermometers that drop out, "
     "bursts of a logger, units that can't be): a third as much again, on one core. pandas 3.1 parses on all "
-    "cores whatever OMP_NUM_THREADS says, checks nothing, and keeps whole numbers as integers, which cost less to parse.",
+    "cores whatever OMP_NUM_THREADS says, checks nothing, and keeps whole numbers as integers, which cost "
+    "less to parse.",
     "read-csv": "As for pandas: plain readers parse, and check nothing.",
     "read-csv-1e7": "Over 64 MB a file goes part by part into temporary files, so that its length does not "
     "matter to memory; plain readers hold all of it, and pandas 3.1 parses on all cores; what is read is "
