@@ -89,7 +89,7 @@ def test_faults_and_repairs_name_the_packed_file_and_the_line_within(tmp_path):
 
 def test_a_profile_reads_a_packed_log_and_names_runs_by_its_text(tmp_path):
     path, profile = tmp_path / "log.csv.gz", tmp_path / "profile.yaml"
-    path.write_bytes(gzip.compress(TEXT))
+    path.write_bytes(gzip.compress(TEXT, mtime=0))
     profile.write_text(draft_profile(path))
     (run,) = import_recording(path, profile)
     assert run.name == "log"
@@ -104,15 +104,19 @@ ENCRYPTED[ENCRYPTED.rindex(b"log/a.csv") - 38] |= 1  # ... and in the directory
 @pytest.mark.parametrize(
     ("name", "content", "told"),
     [
-        ("log.csv.gz", gzip.compress(TEXT)[:-400], "damaged.*end-of-stream"),
-        ("log.csv.gz", gzip.compress(TEXT)[:-8] + bytes(8), "damaged.*CRC"),
+        ("log.csv.gz", gzip.compress(TEXT, mtime=0)[:-400], "damaged.*end-of-stream"),
+        ("log.csv.gz", gzip.compress(TEXT, mtime=0)[:-8] + bytes(8), "damaged.*CRC"),
         ("log.csv.xz", lzma.compress(TEXT)[:-400], "damaged"),
         ("log.csv.zst", zstd(TEXT)[:-400], "damaged"),
-        ("log.csv.gz", gzip.compress(b""), "empty"),
-        ("log.csv.gz", gzip.compress(gzip.compress(TEXT)), "holds a gzip.*unpack it first"),
-        ("log.csv.gz", gzip.compress(b"\x89HDF\r\n\x1a\n" + bytes(99)), "holds a HDF5 file.*unpack it first"),
-        ("log.csv.gz", gzip.compress(np.random.default_rng(0).bytes(4000)), "not a text file"),
-        ("log.mat", gzip.compress(TEXT), "named as MATLAB; unpack it first"),
+        ("log.csv.gz", gzip.compress(b"", mtime=0), "empty"),
+        ("log.csv.gz", gzip.compress(gzip.compress(TEXT, mtime=0), mtime=0), "holds a gzip.*unpack it first"),
+        (
+            "log.csv.gz",
+            gzip.compress(b"\x89HDF\r\n\x1a\n" + bytes(99), mtime=0),
+            "holds a HDF5 file.*unpack it first",
+        ),
+        ("log.csv.gz", gzip.compress(np.random.default_rng(0).bytes(4000), mtime=0), "not a text file"),
+        ("log.mat", gzip.compress(TEXT, mtime=0), "named as MATLAB; unpack it first"),
         ("log.zip", zipped(a=TEXT, b=TEXT), r"holds 2 files \(log/a\.csv, log/b\.csv\).*unpack it first"),
         ("log.zip", zipped(), "holds no file"),
         ("log.zip", bytes(ENCRYPTED), "encrypted"),
@@ -142,7 +146,7 @@ def test_a_bomb_is_refused_before_it_goes_off(tmp_path, scratch, pack):
     most = 1e-6 * limits.expansion * path.stat().st_size + limits.spare_mb
     assert f"over {most:.0f} MB" in str(caught.value) and most < 4.0
     assert not list(scratch.iterdir())
-    path.write_bytes(gzip.compress(TEXT))
+    path.write_bytes(gzip.compress(TEXT, mtime=0))
     assert len(read_run(path)) == 200  # the bound holds for one file alone
 
 
@@ -151,7 +155,7 @@ def test_a_drive_without_room_for_the_text_is_told(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     path = tmp_path / "log.csv.gz"
-    path.write_bytes(gzip.compress(TEXT))
+    path.write_bytes(gzip.compress(TEXT, mtime=0))
     read = Path.open
     monkeypatch.setattr(Path, "open", lambda self, mode="r", **k: (full if "w" in mode else read)(self, mode))
     with pytest.raises(InputError, match=r"no room for .*No space left.*TMPDIR"):
