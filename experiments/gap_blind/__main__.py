@@ -109,11 +109,8 @@ def told(
 ) -> dict[str, Any]:
     """What ``results.json`` holds of some marks; `others` are those of other methods on the same cases."""
     drawn = _drawn(marks)
-    asked = {(m.truth.reality, m.truth.kind, m.truth.case) for m in drawn}
-    beside = {
-        name: [m for m in _drawn(held) if (m.truth.reality, m.truth.kind, m.truth.case) in asked]
-        for name, held in (others or {}).items()
-    }
+    asked = set(map(_case, drawn))
+    beside = {name: [m for m in _drawn(held) if _case(m) in asked] for name, held in (others or {}).items()}
     return {
         "seed": seed,
         "final": final,
@@ -125,6 +122,12 @@ def told(
         "cases": {name: sum(m.truth.reality == name for m in marks) for name in realities},
         "code": sorted({m.code or "" for m in marks}),
     }
+
+
+def _case(mark: Mark) -> tuple[str, str, str, float]:
+    """What tells a case from all others: parts of one kind number theirs alike, and differ by d'."""
+    truth = mark.truth
+    return truth.reality, truth.kind, truth.case, truth.d_prime
 
 
 def _drawn(marks: Sequence[Mark]) -> list[Mark]:

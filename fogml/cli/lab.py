@@ -68,8 +68,7 @@ class RateSettings(Settings):
         [],
         "[RUN...]",
         "Runs on a rate table, with the column rate as commanded.",
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
     )
     twin: str | None = setting(
         None, "Test a twin in place of recorded runs.", metavar="NAME|FILE", reads=True, known=options.TWINS
@@ -154,18 +153,14 @@ class AcceptanceSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.lab_acceptance_job:acceptance_and_write"
-    runs: list[str] = placed(
-        [], "RUN...", "Runs of one unit and axis.", reads=True, known=options.SHIPPED_RUNS
-    )
+    runs: list[str] = placed([], "RUN...", "Runs of one unit and axis.", **options.RUN)
     model: str | None = setting(
         None, "Folder of the unit's model.", metavar="DIR", reads=True, lost=options.LOST_MODEL
     )
     limits: str | None = setting(
         None, "Limits (YAML): customer, document, limits.", metavar="FILE", reads=True, lost="no such file"
     )
-    noise: str | None = setting(
-        None, "Static run for noise terms and floor.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
-    )
+    noise: str | None = setting(None, "Static run for noise terms and floor.", metavar="RUN", **options.RUN)
     averaging: options.Averaging = 100.0
     turn_on_band: float | None = setting(None, "Band that tells the turn-on time.", metavar="DEG/H", gt=0.0)
     date: str | None = setting(None, "Date of issue; a line to write it on if none.")

@@ -98,8 +98,7 @@ class CompensateSettings(Settings):
         None,
         "RUN",
         "The run to compensate.",
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
         needed="no run is given; name the run to compensate",
     )
     model: str | None = setting(
@@ -177,8 +176,7 @@ class ExportJobSettings(Settings):
         "The model's training runs, to prune and to judge on.",
         metavar="RUN...",
         spread=True,
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
     )
     out: options.Folder = "export-results"
 
@@ -217,8 +215,7 @@ class SweepSettings(Settings):
         "Training run; may be repeated.",
         "--run",
         metavar="RUN",
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
         needed="no training run is given; state 'runs' in the file, or --run",
     )
     test: options.TestsIfAny = []

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, field_validator
 
 from fogml.cli.given import argument, option
-from fogml.cli.settings import SHIPPED_RUNS, Settings, setting
+from fogml.cli.settings import RUN, Settings, setting
 from fogml.errors import quoted
 from fogml.yaml_text import parse_yaml
 
@@ -79,8 +79,7 @@ Runs = Annotated[
     argument(
         "RUN...",
         "Training runs.",
-        reads=True,
-        known=SHIPPED_RUNS,
+        **RUN,
         needed="no training run is given; name the training runs before --test",
     ),
 ]
@@ -89,8 +88,7 @@ _TESTS = option(
     "--test",
     metavar="RUN...",
     spread=True,
-    reads=True,
-    known=SHIPPED_RUNS,
+    **RUN,
 )
 Tests = Annotated[list[str], replace(_TESTS, needed="no test run is given; name at least one after --test")]
 TestsIfAny = Annotated[list[str], _TESTS]
@@ -167,8 +165,7 @@ class LimitSettings(Settings):
         None,
         "Static run of the unit: its noise makes the floor.",
         metavar="RUN",
-        reads=True,
-        known=SHIPPED_RUNS,
+        **RUN,
     )
 
     @field_validator("limits", mode="before")

@@ -65,8 +65,7 @@ class InspectSettings(Settings):
         [],
         "RUN...",
         "Runs to look into.",
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
         needed="no run is given; name at least one",
     )
     axis: options.Axis = None
@@ -87,8 +86,7 @@ class NoiseSettings(Settings):
         None,
         "RUN...",
         "A run, best at constant temperature; several share their terms.",
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
         needed="no run is given; name one",
     )
     overlapping: bool = setting(True, "Kind of estimator.", "--overlapping/--not-overlapping")

@@ -22,8 +22,8 @@ from fogml.yaml_text import read_yaml, yaml_text
 
 SHIPPED = "shipped:"
 """What a run's path begins with when it names a recording that ships."""
-SHIPPED_RUNS = "fogml.cli.runs:shipped_places"
-"""Where the names of recordings that ship are; a run of another name is a file."""
+RUN: dict[str, Any] = {"reads": True, "known": "fogml.cli.runs:shipped_places", "lost": "no such file"}
+"""What is declared of a setting that names runs: recordings that ship by their names, else files."""
 
 
 def setting(default: Any, help: str, *names: str, **more: Any) -> Any:
@@ -188,12 +188,11 @@ def _beside(value: Any, folder: Path) -> Any:
 
 def _check_there(value: Any, given: Given, place: str, folders: Sequence[Path]) -> None:
     """Refuse a path that is not there, before the job loads; of others one that is there with slashes."""
-    lost = given.lost or ("no such file" if given.known == SHIPPED_RUNS else "")
     paths = (value if isinstance(value, list) else [value]) if given.reads else []
     for path in (path for path in paths if isinstance(path, str) and not path.startswith(SHIPPED)):
         hint = with_slashes(path, *folders)
-        if hint or (lost and not_there(path)):
-            raise InputError(f"{place}{printable(path)}: {'no such file' if hint else lost}{hint}")
+        if hint or (given.lost and not_there(path)):
+            raise InputError(f"{place}{printable(path)}: {'no such file' if hint else given.lost}{hint}")
 
 
 def absolute(path: str) -> str:

@@ -47,8 +47,7 @@ class ReplaySettings(Settings):
         None,
         "RUN",
         "The run whose inputs to take.",
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
         needed="no run is given; name the run to replay",
     )
     only: str | None = setting(
@@ -89,20 +88,16 @@ class DiagnoseSettings(Settings):
         [],
         "RUN...",
         "Runs to fit on.",
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
         needed="no run is given; name the runs to diagnose before --held-out",
     )
     held_out: list[str] = setting(
         [],
         "Run for the final figure; may be repeated.",
         metavar="RUN",
-        reads=True,
-        known=options.SHIPPED_RUNS,
+        **options.RUN,
     )
-    noise: str | None = setting(
-        None, "Static run of the unit, for its noise.", metavar="RUN", reads=True, known=options.SHIPPED_RUNS
-    )
+    noise: str | None = setting(None, "Static run of the unit, for its noise.", metavar="RUN", **options.RUN)
     twin: options.Twin = "nominal"
     without: list[str] = setting(
         [], "Effect that is no candidate; may be repeated.", metavar="EFFECT", known=options.EFFECTS

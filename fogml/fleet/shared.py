@@ -201,9 +201,8 @@ class SharedModel(MixedEffectsModel):
             )
         if self.agreement_ < ODD:
             return (
-                f"this unit is odd: of units like the fleet's, {percent(self.agreement_)} would lie "
-                "as far out "
-                f"(odd below {percent(ODD, 0)})"
+                f"this unit is odd: of units like the fleet's, {percent(self.agreement_)} would lie as far "
+                f"out (odd below {percent(ODD, 0)})"
             )
         return ""
 

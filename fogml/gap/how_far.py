@@ -161,10 +161,10 @@ class HeldOut:
         self._noises = self._drawn(model, None)
         # Of what the twin has and each run draws anew a replay holds one deviation; the run has its own.
         own = [(d, s) for d, s in found.plant.on if d.drawn_per_run]
-        made = [self.rows.made(d, s.amplitude, s.shape, found.setting.values) for d, s in own]
         self._anew = [d.title for d, _ in own]
+        deviations = [self.rows.made(d, s.amplitude, s.shape, found.setting.values) for d, s in own]
         apart = self._rng.standard_normal((len(self._noises), len(own))) - 1.0
-        self._noises = self._noises + apart**2 @ np.array([_square(windows.of(m)) for m in made])
+        self._noises = self._noises + apart**2 @ np.array([_square(windows.of(one)) for one in deviations])
         self._loudest = float(self._noises.mean()) + Z90 * float(np.std(self._noises))
         level = self._recalibrated > self._loudest
         # Slow noise moves a run's mean more than its shape, which may show a gap where the level doesn't.

@@ -71,6 +71,10 @@ class Where:
     segments: tuple[GapSegment, ...] = ()
 
 
+WORSE = 1.05
+"""Rms after over rms before from which a replay is called worse, of constants and causes alike."""
+
+
 @dataclass(frozen=True)
 class HowFar:
     """How far the gap closes on a held-out run; rms of averages over `averaging_s` [deg/h]."""
@@ -88,8 +92,8 @@ class HowFar:
 
     @property
     def made_worse(self) -> bool:
-        """Whether constants as fitted leave more than those given, by over a twentieth of it."""
-        return self.recalibrated > 1.05 * self.before
+        """Whether constants as fitted leave more than those given, by over `WORSE`."""
+        return self.recalibrated > WORSE * self.before
 
 
 def beyond_noise(far: Sequence[HowFar]) -> str:

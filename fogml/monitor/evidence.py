@@ -182,10 +182,7 @@ class FigureEvidence:
                 freedom = 0.5 * (count[rows, None] - 1.0)
                 later = count[rows, None] <= valid[known]
                 for size in sizes.T:
-                    wide = 1.0 + size[known] * v
-                    # Rounding aside, what a column explains is less than all.
-                    gained = np.minimum(size[known] * b / wide, 1.0 - 1e-15)
-                    ratios = weights[model, rows, None] - 0.5 * np.log(wide) - freedom * np.log1p(-gained)
+                    ratios = weights[model, rows, None] + _gain(size[known], v, b, freedom)
                     ratios[later] = -np.inf
                     self._all[rows, known] = np.logaddexp(self._all[rows, known], ratios)
         self._all -= np.log(self._sizes.size)
@@ -239,9 +236,8 @@ class FigureEvidence:
             v, products = v[told], y @ x[:, told]
             sizes = products / v
             residual = np.maximum(about - products * sizes, 0.0)
-            wide = 1.0 + self._sizes[shape][:, None] * v
-            gained = np.minimum(self._sizes[shape][:, None] * products**2 / about / wide, 1.0 - 1e-15)
-            logs = np.logaddexp.reduce(-0.5 * np.log(wide) - 0.5 * (n - 1) * np.log1p(-gained))
+            sizes_before = self._sizes[shape][:, None]
+            logs = np.logaddexp.reduce(_gain(sizes_before, v, products**2 / about, 0.5 * (n - 1)))
             plain = -log_dets[n - 1] - np.log(length) - 0.5 * (n - 1) * np.log(about)
             parts.append((logs + plain, sizes, np.sqrt(residual / (n - 2) / v)))
         if not parts:
@@ -252,6 +248,15 @@ class FigureEvidence:
         kept = shares > 1e-12
         found = students_ppf(levels, shares[kept] / shares[kept].sum(), sizes[kept], scales[kept], n - 2)
         return [float(value) / unit for value in found]
+
+
+def _gain(size: FloatArray, v: FloatArray, explained: FloatArray, freedom: FloatArray | float) -> FloatArray:
+    """Log evidence that a column adds: squares `v` beside the mean, of size before the data, and the share of
+    the values' squares over `v` that it explains."""
+    wide = 1.0 + size * v
+    # Rounding aside, what a column explains is less than all.
+    gained = np.minimum(size * explained / wide, 1.0 - 1e-15)
+    return np.asarray(-0.5 * np.log(wide) - freedom * np.log1p(-gained))
 
 
 def _about(z: FloatArray) -> tuple[FloatArray, FloatArray]:

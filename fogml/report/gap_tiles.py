@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.gap.result import Diagnosis
-from fogml.gap.result_parts import beyond_noise
+from fogml.gap.result_parts import WORSE, beyond_noise
 from fogml.numerals import MISSING, listed, number, percent, plural, probability_words
 from fogml.report.gap_words import (
     cause_words,
@@ -24,8 +24,6 @@ from fogml.report.page import Tile
 
 _FAR_UNDER_FLOOR = 0.6
 """Rms over the floor under which the floor is in doubt."""
-_WORSE = 1.05
-"""Rms after over before from which what was found does harm."""
 
 
 def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
@@ -123,7 +121,7 @@ def warnings(found: Diagnosis, names: dict[str, str]) -> list[str]:
                 f"{number(item.recalibrated)} deg/h after {number(item.before)}. Its runs may be of another "
                 "state of the unit."
             )
-        if found.named and item.after > _WORSE * item.recalibrated:
+        if found.named and item.after > WORSE * item.recalibrated:
             told.append(
                 f"What was found makes the replay of {item.run} worse: {number(item.after)} deg/h where the "
                 f"recalibrated twin leaves {number(item.recalibrated)}. Doubt it there."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fogml.numerals import MISSING, duration, lowest_from, number, unit_words
+from fogml.numerals import MISSING, duration, lowest_from, number, percent, unit_words
 from fogml.report.figures_noise import TERM_WORDS, allan_plot
 from fogml.report.page import Tile, render
 from fogml.report.tables import Table, noticed
@@ -98,8 +98,8 @@ def terms_table(noise: Mapping[str, Any]) -> Table:
         else:
             told = "seen" if interval[0] else "not told from zero"
         rows.append((f"{key}, {words}", number(value), _interval(term), _unit(term), told))
-    level = 100 * float(noise.get("level", 0.9))
-    return Table(f"Term | >Value | >{level:.0f} % interval | Unit | In the data", rows)
+    level = percent(float(noise.get("level", 0.9)), 0)
+    return Table(f"Term | >Value | >{level} interval | Unit | In the data", rows)
 
 
 def deviations_table(noise: Mapping[str, Any]) -> Table:

@@ -189,9 +189,8 @@ def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
             # What it takes away there all the same, it takes away as it falls back.
             "do_not_use" if mostly and against else "use_with_care",
             f"{percent(run.outside_training, 0)} of {run.run} is outside of what was trained",
-            f"{percent(run.outside_training)} of {run.run} lies at temperatures or rates that "
-            "training did not "
-            "hold: there the model falls back.",
+            f"{percent(run.outside_training)} of {run.run} lies at temperatures or rates that training did "
+            "not hold: there the model falls back.",
             "Train over the whole range of use.",
         )
     held = coverage(run)
@@ -199,9 +198,8 @@ def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
         yield Reason(
             "use_with_care",
             f"its interval does not hold on {run.run}",
-            f"Its {percent(LEVEL, 0)} interval holds {percent(held, 0)} of the averages of "
-            f"{run.run}: that run is unlike the "
-            "training runs.",
+            f"Its {percent(LEVEL, 0)} interval holds {percent(held, 0)} of the averages of {run.run}: that "
+            "run is unlike the training runs.",
             "Train on more runs, this one among them, and judge on a new one.",
         )
 

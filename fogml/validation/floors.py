@@ -180,8 +180,7 @@ def out_of_reach(
     return (
         f"No model can reach the design index of {index:g} deg/h: the noise alone leaves {short(floor)} "
         f"deg/h rms ({short(low)} to {short(high)}, {percent(LEVEL, 0)}) in {count} averages over "
-        f"{averaging_s:g} s "
-        f"of {where}"
+        f"{averaging_s:g} s of {where}"
     )
 
 

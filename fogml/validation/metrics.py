@@ -181,8 +181,7 @@ class RunMetrics:
         if found < 2:
             raise InputError(
                 f"{run.name}: {counted(int(used.sum()), 'usable row')} give {counted(found, 'average')} "
-                f"over {averaging_s:g} s, at "
-                "least 2 are needed; choose a shorter --averaging or a longer run"
+                f"over {averaging_s:g} s, at least 2 are needed; choose a shorter --averaging or a longer run"
             )
 
     @property
@@ -194,9 +193,8 @@ class RunMetrics:
         if not small:
             return ()
         return (
-            f"{small} turns below {percent(LEAST_SHARE, 0)} of the greatest rate tell nonlinearity "
-            "and asymmetry; "
-            "the largest scale factor error of single turns leaves them out for their noise",
+            f"{small} turns below {percent(LEAST_SHARE, 0)} of the greatest rate tell nonlinearity and "
+            "asymmetry; the largest scale factor error of single turns leaves them out for their noise",
         )
 
     @property
