@@ -257,21 +257,12 @@ class _Reader:
         if self.is_cut and is_last and len(rows) and rows[-1] == len(numbers) - 1:
             faulty[-1] = True
         if faulty.any():
-            line = int(numbers[rows[np.argmax(faulty)]])
             if not self.profile.reject.not_numbers or 2 * np.count_nonzero(faulty) > len(rows):
+                row = int(np.argmax(faulty))
                 wrong = {s: ~np.isfinite(v) for s, v, used in zip(sources, values, self.filled) if used}
                 if seconds is not None:
                     wrong = dict.fromkeys(self.profile.stamps, np.isnan(seconds)) | wrong
-                row = int(np.argmax(faulty))
-                source = next((source for source, bad in wrong.items() if bad[row]), next(iter(places)))
-                count = int(np.count_nonzero(wrong[source]))
-                separator, first = self.profile.text_separator, ""
-                cell = shown(lines.line(line).split(separator)[places[source]], separator).strip()
-                if source in texts:
-                    cell, first = (" ".join(texts[s][i] for s in self.profile.stamps) for i in (row, 0))
-                place = f"{self.file}, line {self.lines_before + line + 1}"
-                told = cell_words(cell, first, source == self.profile.clock)
-                raise FaultyFields(place, str(source), told, count, len(rows), self.hint)
+                raise self._faulty_fields(lines, int(numbers[rows[row]]), row, places, wrong, texts)
             bad = np.zeros(len(numbers), dtype=bool)
             bad[rows[faulty]] = True
             self._reject("with text or nothing in a number's place", bad)
@@ -280,6 +271,27 @@ class _Reader:
             seconds = None if seconds is None else seconds[~faulty]
         compared = {source: texts[source] for source in self.profile.compared_texts}
         return LoggerTable(dict(zip(sources, values)), rows, len(numbers), (), compared, seconds)
+
+    def _faulty_fields(
+        self,
+        lines: Lines,
+        line: int,
+        row: int,
+        places: dict[str | int, int],
+        wrong: Mapping[str | int, BoolArray],
+        texts: Mapping[str | int, NDArray[np.str_]],
+    ) -> FaultyFields:
+        """What to say of the first row of a part with a wrong field; `wrong` marks each source's by row."""
+        source = next((source for source, bad in wrong.items() if bad[row]), next(iter(places)))
+        if source in texts:
+            cell, first = (" ".join(texts[s][i] for s in self.profile.stamps) for i in (row, 0))
+        else:
+            fields = lines.line(line).split(self.profile.text_separator)
+            cell, first = shown(fields[places[source]], self.profile.text_separator).strip(), ""
+        told = cell_words(cell, first, source == self.profile.clock)
+        place = f"{self.file}, line {self.lines_before + line + 1}"
+        count, rows = int(np.count_nonzero(wrong[source])), len(wrong[source])
+        return FaultyFields(place, str(source), told, count, rows, self.hint)
 
     def _reject(self, what: str, rows: BoolArray) -> None:
         """Count rejected rows; `rows` (n,) marks them among the data rows of a part."""
