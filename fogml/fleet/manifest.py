@@ -70,7 +70,7 @@ def read_manifest(path: str | Path) -> list[Unit]:
     """The units of a manifest, in its order.
 
     A CSV file has the columns ``unit, job, train, test, axis``, lists of runs separated by ``;``, within
-    quotation marks where that separates cells too. Columns
+    quotation marks where that separates cells too. Lines that begin with ``#`` are comments. Columns
     such as ``covariate:coil_lot`` state what is known of a unit's production; empty cells are not known.
     A YAML file is a list of mappings with these keys, or has them under ``units``. Runs are looked
     for from here, then from where the manifest lies.
@@ -93,15 +93,17 @@ def read_manifest(path: str | Path) -> list[Unit]:
 
 def _csv_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
     """Rows as a spreadsheet program saves them, in any language: its encoding and what separates cells."""
-    lines = [line for line in io.StringIO(text_of(path), newline="") if not line.startswith("#")]
-    head = lines[0] if lines else ""
+    # Rows are told by the numbers that a spreadsheet program shows beside them.
+    numbered = list(enumerate(io.StringIO(text_of(path), newline=""), start=1))
+    numbers, lines = zip(*[(i, line) for i, line in numbered if not line.startswith("#")] or [(1, "")])
+    head = lines[0]
     separator = next((mark for mark in ",;\t" if mark in head), ",")
     try:
         reader = csv.DictReader(lines, delimiter=separator, skipinitialspace=True, strict=True)
         heads = [str(name).strip() for name in reader.fieldnames or ()]
         _check_keys(heads, f"{path.name}: header")
         reader.fieldnames = heads
-        return [(f"row {number}", row) for number, row in enumerate(reader, start=2) if any(row.values())]
+        return [(f"row {numbers[reader.line_num - 1]}", row) for row in reader if any(row.values())]
     except csv.Error as error:
         raise InputError(
             f"{path.name}: not readable as CSV ({error}); is a quotation mark not closed?"

@@ -79,6 +79,10 @@ def test_a_list_is_no_name(folder):
     [
         (HEAD + "F-1,trian,a.csv,b.csv,x\n", "'trian'; train, compare, diagnose, acceptance"),
         (HEAD + ",train,a.csv,b.csv,x\n", "row 2: column 'unit' is empty"),
+        (
+            HEAD + "# made by hand\n\nF-1,train,a.csv,b.csv,x\n\n,,,,\n,train,a.csv,b.csv,x\n",
+            "row 7: column 'unit'",
+        ),
         (HEAD + "F-1,train,a.csv,,x\n", "column 'test' names no run"),
         (HEAD + "F-1,train,,b.csv,x\n", "column 'train' names no run"),
         (HEAD + "F-1,train,a.csv,b.csv,x,more\n", "more cells than the header"),
