@@ -13,6 +13,7 @@ from fogml.escaping import CCode
 from fogml.export.c_float import literal, sensor_identifier
 from fogml.export.c_program import run_self_test, write_files
 from fogml.export.c_source import HEADER, SOURCE, project_files, templates
+from fogml.export.check import runs_of_each
 from fogml.export.documentation import DOCUMENTATION_FILE
 from fogml.export.export import export_model
 from fogml.export.plan import Plan
@@ -85,8 +86,7 @@ def export_axes(
         )
     rows = None if matrix is None else read_matrix(matrix, len(named)).tolist()
     reports, codes, sensors = {}, [], []
-    for axis, model in named.items():
-        runs = [run for run in train if run.facts.axis == axis]
+    for (axis, model), runs in zip(named.items(), runs_of_each([*named.values()], train), strict=True):
         with scratch_folder() as alone:
             reports[axis] = export_model(model, alone, settings, runs)
             (folder / f"{axis}-{DOCUMENTATION_FILE}").write_bytes((alone / DOCUMENTATION_FILE).read_bytes())

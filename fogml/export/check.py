@@ -228,6 +228,25 @@ class TrainingRows:
         return self.atoms[:, [self.plan.atoms.index(atom) for atom in plan.atoms]]
 
 
+def runs_of_each(models: Sequence[DriftModel], runs: Sequence[Run]) -> list[list[Run]]:
+    """The training runs of each model among some runs.
+
+    Raises
+    ------
+    InputError
+        If a run is none of the models' training runs: choices must not see other data.
+    """
+    known = [{run.sha256 for run in model.card_.runs} for model in models]
+    for run in runs:
+        if not any(run.hash in own for own in known):
+            names = ", ".join(dict.fromkeys(run.name for model in models for run in model.card_.runs))
+            raise InputError(
+                f"{run.name}: is not one of the runs that the model was trained on ({names}); "
+                "--train takes those alone, as they were"
+            )
+    return [[run for run in runs if run.hash in own] for own in known]
+
+
 def training_rows(model: DriftModel, plan: Plan, runs: Sequence[Run]) -> TrainingRows:
     """The rows of a model's training runs.
 
@@ -236,14 +255,7 @@ def training_rows(model: DriftModel, plan: Plan, runs: Sequence[Run]) -> Trainin
     InputError
         If a run is none of the model's training runs: choices must not see other data.
     """
-    known = {run.sha256 for run in model.card_.runs}
-    for run in runs:
-        if run.hash not in known:
-            names = ", ".join(run.name for run in model.card_.runs)
-            raise InputError(
-                f"{run.name}: is not one of the runs that the model was trained on ({names}); "
-                "--train takes those alone, as they were"
-            )
+    runs_of_each([model], runs)
     if model.features_ is None:
         raise InputError("--train: the model has no features, so there is nothing to choose")
     features = model.features_

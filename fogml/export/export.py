@@ -131,7 +131,7 @@ def _pruned(
         return whole, None
     points, where = reached_points(whole, settings.seed) if rows is None else (rows.atoms, "training runs")
     columns = whole.full_columns(points)
-    target = whole.value(columns) if rows is None or whole.gives_rate else rows.target
+    target = whole.value(columns, np.zeros(len(columns))) if rows is None or whole.gives_rate else rows.target
     plan = pruned(whole, settings.budget, dtype, settings.to == "c", columns, target)
     if plan is whole:
         return whole, None

@@ -9,6 +9,7 @@ from typing import Any
 
 from fogml import __version__
 from fogml.errors import InputError, known_are
+from fogml.escaping import visible
 from fogml.json_files import json_text
 
 KALMAN_SCHEMA = "fogml.kalman/1"
@@ -99,7 +100,7 @@ def process_noise(white: float, walk: float, interval_s: float) -> list[list[flo
 
 
 def _head(found: NoiseParameters, mark: str) -> str:
-    lines = [f"{mark} fogml {__version__}: noise of {found.run}"]
+    lines = [f"{mark} fogml {__version__}: noise of {visible(found.run)}"]
     if found.bounds:
         lines.append(
             f"{mark} {' and '.join(found.bounds)}: upper end of the 90 % interval, as the run tells no value"

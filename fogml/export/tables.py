@@ -13,7 +13,7 @@ from numpy.polynomial import Polynomial
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, quoted
 from fogml.export import segment_files
-from fogml.export.check import averaged_loss, training_rows
+from fogml.export.check import averaged_loss, runs_of_each, training_rows
 from fogml.export.documentation import export_card
 from fogml.export.plan import Plan
 from fogml.export.segments import Segments, segments
@@ -98,7 +98,10 @@ def export_tables(
             )
             for axis, curve in curves.items()
         }
-        losses = {axis: _loss(named[axis], plans[axis], tables[axis], train) for axis in named}
+        losses = {
+            axis: _loss(named[axis], plans[axis], tables[axis], own)
+            for axis, own in zip(named, runs_of_each([*named.values()], train), strict=True)
+        }
         found = segment_files.write(folder, tables, matrix, cards, losses, dtype)
         errors = {axis: table.largest for axis, table in tables.items()}
     else:
@@ -184,9 +187,8 @@ def _tolerance(settings: TableSettings, model: DriftModel) -> float:
     return TOLERANCE_SHARE * float(model.intervals_.half_width(LEVEL))
 
 
-def _loss(model: DriftModel, plan: Plan, table: Segments, train: Sequence[Run]) -> dict[str, Any] | None:
-    """What table and model leave on the training runs of this axis; None where none was given."""
-    own = [run for run in train if run.hash in {known.sha256 for known in model.card_.runs}]
+def _loss(model: DriftModel, plan: Plan, table: Segments, own: Sequence[Run]) -> dict[str, Any] | None:
+    """What table and model leave on training runs of this axis; None where none was given."""
     if not own or plan.gives_rate:
         return None
     rows = training_rows(model, plan, own)

@@ -11,7 +11,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, known_are
 from fogml.features.operators import DEFAULT_WINDOW, MEMORY_OPERATORS, Window, windowed_values
-from fogml.features.own import Function, Recursion, own_operator
+from fogml.features.own import Function, Recursion, own_operator, taken_in
 from fogml.features.signal import TIME_ON, Signal
 from fogml.numerals import number_text
 from fogml.runs.columns import is_temperature
@@ -289,7 +289,8 @@ def _evaluated(
             assert memory is not None
             memories[atom] = memory
             column[:skip] = 0.0
-            column[skip:], atom_settled = memory.push(clock.time[skip:], np.ascontiguousarray(signal[skip:]))
+            held = np.ascontiguousarray(signal[skip:])
+            column[skip:], atom_settled = taken_in(memory, clock.time[skip:], held, atom.text)
             settled[skip:] &= atom_settled
             continue
         key = (atom.signal, atom.window)

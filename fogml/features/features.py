@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import Atom, AtomValues, Memories, evaluate
-from fogml.features.blocks import evaluate_measured, heeded_rows
+from fogml.features.blocks import evaluate_measured, heeded_rows, unmeasured_rows
 from fogml.features.box import Box, reaching_box
 from fogml.features.grammar import parse_terms
 from fogml.features.signal import check_holds
@@ -285,10 +285,11 @@ class Features(Transformer):
         linear
             If so, as for a model that goes on linearly.
         """
-        if limited:
-            values, full, _ = self.atom_values(run)
-            return self.compose(self.limit(values, full, linear=linear)[0])
         check_holds(run, self.sensors, self._text)
+        run = run.read_by(self.thermometer)
+        if limited or unmeasured_rows(self._atoms, run) is not None:
+            values, full, _ = self.atom_values(run)
+            return self.compose(self.limit(values, full, linear=linear)[0] if limited else values)
         columns = np.empty((len(run), len(self)), order="F")
         terms = list(columns.T)
         atoms = atom_columns(self._plan, terms, len(self._atoms))

@@ -166,7 +166,7 @@ class OperandReader(TokenReader):
         self.next += 1
         if of_signal:
             self.unit_of_number(signal, "number", "4 degC")
-        return sign * float(token.text)
+        return sign * self.finite(token)
 
     def beyond(self, signal: Signal) -> Atom:
         at = self.token.at
@@ -186,7 +186,14 @@ class OperandReader(TokenReader):
             )
         self.next += 1
         self.unit_of_number(signal, "bound", "beyond(T, -20 degC, 60 degC)")
-        return sign * float(token.text)
+        return sign * self.finite(token)
+
+    def finite(self, token: Token) -> float:
+        """What a number's text says, if a number can be as large."""
+        value = float(token.text)
+        if value == float("inf"):
+            self.fail("the number is too large", token.at)
+        return value
 
     def half_width(self, signal: Signal) -> float:
         token = self.token

@@ -181,6 +181,29 @@ class RecursionOperator:
         return values, settled
 
 
+def taken_in(
+    operator: MemoryOperator, time: FloatArray, x: FloatArray, text: str
+) -> tuple[FloatArray, BoolArray]:
+    """Values of an operator, `text` in features, at the next samples, and where they are settled; (n,) each.
+
+    Raises
+    ------
+    InputError
+        If it makes no number of a sample, as a wave of period 0 does.
+    """
+    try:
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            values, settled = operator.push(time, x)
+    except (ArithmeticError, ValueError) as error:
+        raise InputError(f"{text} can't be worked out ({error}); state other numbers in it") from None
+    if not (finite := np.isfinite(values)).all():
+        at = int(np.argmin(finite))
+        raise InputError(
+            f"{text} is {values[at]} at time {time[at]:.10g} s, of {x[at]:.6g}; state other numbers in it"
+        )
+    return values, settled
+
+
 Declared = Function | Recursion | Kernel
 _declared: dict[str, Declared] = {}
 _looked_up = False

@@ -12,6 +12,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.features.atoms import RATE_UNIT_S, Atom, Window, direction
 from fogml.features.features import Features
+from fogml.features.own import taken_in
 from fogml.features.signal import TIME_ON, Signal
 from fogml.runs.columns import is_temperature
 from fogml.runs.dropouts import ThermometerStream, Told
@@ -164,7 +165,7 @@ class FeatureStream:
             key = _operator_key(atom)
             if atom in self._memories:
                 signal = np.array([float(signal_values[atom.signal])])
-                remembered, is_settled = self._memories[atom].push(now, signal)
+                remembered, is_settled = taken_in(self._memories[atom], now, signal, atom.text)
                 atoms[0, column] = remembered[0]
                 settled &= bool(is_settled[0])
             elif key is None:

@@ -137,8 +137,8 @@ def _errors(run: Run, model: DriftModel | None) -> RunErrors:
         return run_errors(model, run)
     full = np.ones(len(run), dtype=np.bool_)
     used, notes = usable_rows(run, full)
-    nothing = np.zeros(len(run))
-    return RunErrors(run, run.error_deg_h, nothing, nothing, np.zeros(len(run), np.int8), full, used, notes)
+    nothing, good = np.zeros(len(run)), np.zeros(len(run), np.int8)
+    return RunErrors(run, run.error_deg_h, nothing, nothing, good, good != 0, full, used, notes)
 
 
 def _left_out(errors: Sequence[RunErrors]) -> list[str]:

@@ -72,9 +72,8 @@ class AutoModel(DriftModel):
             If the runs don't belong together, lack a temperature, or are too short.
         """
         group = checked_runs(runs)
-        if self.features is not None:
-            resolve_features(self.features, group)
-        trial = Trial(group, self.seed, self.features)
+        features = None if self.features is None else resolve_features(self.features, group).text
+        trial = Trial(group, self.seed, features)
         scores = []
         for done, candidate in enumerate(trial.candidates):
             scores.append(trial.score(candidate))
@@ -82,7 +81,7 @@ class AutoModel(DriftModel):
                 self.progress(done + 1, len(trial.candidates), candidate.name)
         self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
         self.choice_ = trial.chosen(scores)
-        self.weighed_ = weigh(group, self.choice_.candidate, self.features, self.seed, trial.one_rate)
+        self.weighed_ = weigh(group, self.choice_.candidate, features, self.seed, trial.one_rate)
         self.chosen_ = self.weighed_.model
         notes = (*refusals(group), *self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)

@@ -202,7 +202,11 @@ def _bounded(
 def combined(
     members: Sequence[tuple[Features, LinearRegressor]], weights: FloatArray, mean: float
 ) -> tuple[Features, LinearRegressor]:
-    """The members' weighed sum about a mean [deg/h] as one linear regressor of all their features."""
+    """The members' weighed sum about a mean [deg/h] as one linear regressor of all their features.
+
+    Members err by the same noise of the same rows: of weights w that add up to W, the covariance of the sum
+    is at most W times the weighed sum of covariances (Jensen), which it is of members that err alike.
+    """
     union = reduce(add, (features for features, _ in members))
     place = {term: i for i, term in enumerate(union.terms)}
     coef, intercept = np.zeros(len(union)), mean * (1.0 - float(weights.sum()))
@@ -213,6 +217,6 @@ def combined(
         coef[at] += weight * regressor.coef_
         intercept += weight * regressor.intercept_
         rows = np.concatenate([[0], at + 1])
-        covariance[np.ix_(rows, rows)] += weight**2 * regressor.covariance_
+        covariance[np.ix_(rows, rows)] += weight * float(weights.sum()) * regressor.covariance_
         noise = max(noise, regressor.residual_std_)
     return union, linear_regressor(coef, intercept, covariance, noise)

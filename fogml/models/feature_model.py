@@ -283,10 +283,7 @@ def check_feature_text(text: str) -> None:
 
 def resolve_features(features: str | Features, runs: Sequence[Run]) -> Features:
     """Features of one's own from their text, terms with ``{sensor}`` written out for the runs' sensors."""
-    text = features if isinstance(features, str) else features.text
-    if _EACH_SENSOR in text:
-        text = _written_out(text, shared_sensors(runs))
-    resolved = parse_features(text)
+    resolved = parse_features(written_out(features if isinstance(features, str) else features.text, runs))
     for run in runs:
         check_holds(run, resolved.sensors, resolved.text)
     check_suits(resolved, runs)
@@ -315,11 +312,17 @@ def shared_sensors(runs: Sequence[Run]) -> list[str]:
     )
 
 
-def _written_out(text: str, sensors: Sequence[str]) -> str:
-    terms = [term.strip() for term in re.split(r",(?![^\[]*\])", text)]
+def written_out(text: str, runs: Sequence[Run]) -> str:
+    """Text of features with terms of ``{sensor}`` written for each coil sensor that the runs share."""
+    if _EACH_SENSOR not in text:
+        return text
+    # Commas within parentheses and brackets part no terms.
+    terms = [term.strip() for term in re.split(r",(?![^()\[\]]*[)\]])", text)]
     fixed = [term for term in terms if _EACH_SENSOR not in term]
     each = [term for term in terms if _EACH_SENSOR in term]
-    return ", ".join([*fixed, *[term.replace(_EACH_SENSOR, name) for name in sensors for term in each]])
+    return ", ".join(
+        [*fixed, *[t.replace(_EACH_SENSOR, name) for name in shared_sensors(runs) for t in each]]
+    )
 
 
 def _part(rows: RunRows, features: Features) -> Part:

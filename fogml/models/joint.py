@@ -34,7 +34,7 @@ from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.compact import Compact, affine
-from fogml.models.feature_model import resolve_features
+from fogml.models.feature_model import resolve_features, written_out
 from fogml.models.folds import dealt_folds
 from fogml.models.intervals import interval_table, out_of_fold_intervals
 from fogml.models.linear import LinearRegressor
@@ -134,9 +134,10 @@ class JointModel(DriftModel):
         )
         if not group[0].earth_known and not self.patent:
             notes.append("Earth rate is not known: the intercept holds that of the training attitude")
-        self.features_ = self._own_features()
-        if self.features is not None:
-            resolve_features(self.features, group)
+        self._bias_text = None if self.features is None else written_out(self.features, group)
+        self.features_ = self._own_features(self._bias_text)
+        if self._bias_text is not None:
+            resolve_features(self._bias_text, group)
         rows = [self._rows(run) for run in group]
         _check_turns(group, rows)
         learn_box(self.features_, [part.atoms[:, 1:] for part in rows])
@@ -221,7 +222,7 @@ class JointModel(DriftModel):
             "product": self.product,
             "rate_window_s": float(self.rate_window_s),
             "gradient": self.gradient_,
-            "features": self.features,
+            "features": self._bias_text,
         }
         return {**own, "regressor": values}, arrays
 
@@ -233,14 +234,15 @@ class JointModel(DriftModel):
         saved = strictly(_Saved, values, "model")
         model = cls(saved.patent, saved.product, saved.rate_window_s, saved.features)
         model.gradient_ = saved.gradient
-        model.features_ = model._own_features()
+        model._bias_text = saved.features
+        model.features_ = model._own_features(saved.features)
         model.features_.set_box(card.box, card.slices, card.thermometer)
         model.regressor_ = LinearRegressor.from_saved(saved.regressor, arrays)
         if model.regressor_.n_features_in_ != 3 + len(model.features_.names()):
             raise InputError("coefficients and columns differ in number")
         return model
 
-    def _own_features(self) -> Features:
+    def _own_features(self, bias_text: str | None) -> Features:
         terms = ["T"]
         if self.gradient_:
             terms.append("T_in-T_out")
@@ -249,7 +251,7 @@ class JointModel(DriftModel):
         if self.product:
             terms.append(f"T*dT{window}")
         own = parse_features(", ".join(terms))
-        return own if self.features is None else own + parse_features(self.features)
+        return own if bias_text is None else own + parse_features(bias_text)
 
     def _rows(self, run: Run) -> RunRows:
         atoms, full, _ = self.features_.atom_values(run)

@@ -12,7 +12,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL, Z90
-from fogml.models.base import OUTSIDE, DriftModel, Evaluation
+from fogml.models.base import DriftModel, Evaluation
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
 from fogml.monitor.figures import Averages, run_figures
@@ -223,7 +223,7 @@ class _Recording:
         )
         self.samples += len(block)
         self.low, self.high = min(self.low, float(block.gyro.min())), max(self.high, float(block.gyro.max()))
-        self.outside += int(np.sum(evaluation.flag == OUTSIDE))
+        self.outside += int(np.count_nonzero(evaluation.outside & evaluation.full))
         self.last_s = float(block.time[-1])
 
     def key(self, sha: str) -> str:

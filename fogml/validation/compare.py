@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from fogml.errors import FogmlError, InputError, in_one_line
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S
-from fogml.validation.judge import judgement_of
+from fogml.validation.judge import index_notes, judgement_of
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import check_turn_on_band, repeatability_of
 from fogml.validation.results import Judgement
@@ -40,7 +40,7 @@ def merged_folds(
         test=test,
         design_index=outcome_of("rms", design_index, test) if design_index is not None else None,
         limits=tuple(outcome_of(name, limit, test) for name, limit in limits.items()),
-        notes=(*whole.notes, note),
+        notes=(*whole.notes, *index_notes(test, design_index), note),
         repeatability=repeatability_of(test),
     )
 

@@ -21,6 +21,7 @@ from fogml.models.card import runs_of
 from fogml.models.table import usable_rows
 from fogml.numerals import short
 from fogml.runs.run import Run
+from fogml.runs.transitions import transition_mask
 from fogml.signals.averages import AVERAGING_S, block_averages
 from fogml.validation.floors import floor_of_run, out_of_reach
 
@@ -182,9 +183,9 @@ def train_until_index(
 def _out_of_reach(runs: Sequence[Run], design_index: float, averaging_s: float) -> str | None:
     floors, averages = [], []
     for run in runs:
-        every = np.ones(len(run), dtype=bool)
-        averages.append(len(block_averages(run.time, run.error_deg_h, window_s=averaging_s).values[0]))
-        floors.append(floor_of_run(run, every, run.error_deg_h, averaging_s))
+        used, _ = usable_rows(run, np.ones(len(run), dtype=np.bool_))
+        averages.append(len(block_averages(run.time[used], window_s=averaging_s)))
+        floors.append(floor_of_run(run, used, run.error_deg_h, averaging_s))
     return out_of_reach(design_index, floors, averages, averaging_s, "the training runs")
 
 
@@ -221,6 +222,10 @@ def _folds(runs: Sequence[Run]) -> list[tuple[list[Run], Run, BoolArray]]:
         ]
     (run,) = runs
     edges = np.linspace(0, len(run), PARTS + 1).astype(int)
+    if "rate" in run.columns:
+        # A part that began amid a change of the table's rate would not know that its first rows are of one.
+        calm = np.append(np.flatnonzero(~transition_mask(run)), len(run))
+        edges[1:-1] = calm[np.searchsorted(calm, edges[1:-1])]
     folds = []
     for start, stop in pairwise(edges.tolist()):
         held = np.zeros(len(run), dtype=bool)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.models.base import NOT_FULL, OUTSIDE
+from fogml.models.base import NOT_FULL
 from fogml.models.card import runs_of
 from fogml.numerals import percent
 from fogml.runs.findings import Finding
@@ -136,12 +136,12 @@ def judgement_of(
         test=judged_test,
         design_index=outcome_of("rms", design_index, judged_test) if design_index is not None else None,
         limits=tuple(outcome_of(name, limit, judged_test) for name, limit in limits.items()),
-        notes=(*notes, *_out_of_reach(judged_test, design_index), *_notes(train_runs, test_runs)),
+        notes=(*notes, *index_notes(judged_test, design_index), *_notes(train_runs, test_runs)),
         repeatability=repeatability_of(judged_test),
     )
 
 
-def _out_of_reach(test: Sequence[RunJudgement], design_index: float | None) -> tuple[str, ...]:
+def index_notes(test: Sequence[RunJudgement], design_index: float | None) -> tuple[str, ...]:
     """For each test run on which the noise alone is over the design index, that no model can meet it."""
     if design_index is None:
         return ()
@@ -204,7 +204,7 @@ def judge_run(
     metrics = RunMetrics(run, used, averaging_s, full=errors.full, turn_on_band=turn_on_band)
     before = errors.before - constant[0]
     after = errors.after - constant[1]
-    outside = int((errors.flag[used] == OUTSIDE).sum())
+    outside = int(np.count_nonzero(errors.outside & used))
     share = outside / int(used.sum())
     findings = (*run.findings, *seen)
     if outside:

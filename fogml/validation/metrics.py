@@ -86,7 +86,7 @@ def turn_on_time(
         at_once = float(time[0]) - powered_on_s
         return at_once if at_once <= averaging_s else None
     last = int(outside[-1])
-    if last >= first_settled - 1:
+    if last >= first_settled:
         return math.inf
     edge = math.copysign(band_deg_h, away[last])
     share = (away[last] - edge) / (away[last] - away[last + 1])

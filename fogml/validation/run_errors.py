@@ -36,6 +36,8 @@ class RunErrors:
         Half-width of the model's 90 % prediction interval [deg/h].
     flag
         0 good, 1 outside what the model was trained on, 2 window not full.
+    outside
+        Rows outside what the model was trained on, whatever their flag: one that has not settled is 2.
     full
         Rows whose windows are full.
     used
@@ -50,6 +52,7 @@ class RunErrors:
     drift: FloatArray
     half_width: FloatArray
     flag: NDArray[np.int8]
+    outside: BoolArray
     full: BoolArray
     used: BoolArray
     notes: tuple[str, ...]
@@ -81,6 +84,7 @@ def run_errors(model: DriftModel, run: Run, *, any_unit: bool = False) -> RunErr
         drift=evaluation.drift,
         half_width=model.intervals_.half_width(LEVEL, evaluation.excess),
         flag=evaluation.flag,
+        outside=evaluation.outside,
         full=evaluation.full,
         used=used,
         notes=(*notes, *left_out),

@@ -199,6 +199,14 @@ def test_refusals_say_why(model_of, tmp_path, settings, message):
         export_model(model_of("rbf"), tmp_path, settings)
 
 
+def test_a_scale_factor_keeps_all_of_its_numbers(model_of, tmp_path):
+    """Those of a joint model are few: a budget that holds them changes nothing, a smaller one is refused."""
+    report = export_model(model_of("joint"), tmp_path, ExportSettings("json", budget=1000))
+    assert "pruning" not in report and report["bytes_weights"] <= 1000
+    with pytest.raises(InputError, match="has none to leave out"):
+        export_model(model_of("joint"), tmp_path, ExportSettings("json", budget=20))
+
+
 SCIKIT_LEARN = [
     ("sklearn.linear_model.Ridge", {}),
     ("sklearn.cross_decomposition.PLSRegression", {"n_components": 2}),

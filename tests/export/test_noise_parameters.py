@@ -41,6 +41,12 @@ def test_q_is_that_of_the_matrix_exponential(interval_s):
     np.testing.assert_allclose(process_noise(white, walk, interval_s), big[2:, 2:].T @ big[:2, 2:], rtol=1e-9)
 
 
+@pytest.mark.parametrize("to", ["kalibr", "matlab"])
+def test_a_name_of_two_lines_stays_a_comment(to):
+    plain, odd = (noise_text(noise() | {"run": run}, to)[1] for run in ("a", "a\nupdate_rate: 1\n"))
+    assert odd.splitlines()[1:] == plain.splitlines()[1:]
+
+
 def test_each_program_reads_its_file():
     found = noise_parameters(noise())
     name, text = noise_text(noise(), "kalibr")

@@ -205,6 +205,25 @@ def test_what_does_not_go_together_is_told(axes, tmp_path, model_of):
         export_tables([x], tmp_path, TableSettings("segments", matrix=tmp_path / "m.yaml"))
 
 
+@pytest.mark.parametrize("axis", ["roll-1", "*/ int evil;"])
+def test_an_axis_of_any_name_has_a_table_in_c(tmp_path, axis):
+    time = np.arange(0.0, 4000.0, 4.0)
+    T = 20.0 + 15.0 * np.sin(time / 600.0)
+    run = Run.from_columns("a", Facts(axis=axis), time=time, gyro=0.1 * T, T=T)
+    model = make_model("polynomial", features="T").fit(run)
+    assert (
+        export_tables([model], tmp_path, TableSettings("segments"))["axes"][axis]["c_largest_difference"]
+        < 0.01
+    )
+
+
+def test_a_run_that_none_was_trained_on_is_refused(axes, tmp_path):
+    models, (_, run) = [model for model, _ in axes.values()], axes["x"]
+    other = run.with_columns(gyro=run.gyro + 1.0)
+    with pytest.raises(InputError, match="is not one of the runs that the model was trained on"):
+        export_tables(models, tmp_path, TableSettings("segments"), [other])
+
+
 def test_a_joint_models_scale_factor(model_of, tmp_path):
     report = export_tables([model_of("joint")], tmp_path, TableSettings("segments", "float64"))
     (told,) = report["axes"].values()

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
 from fogml.export.c_program import CProgram
 from fogml.export.c_source import c_source
 from fogml.export.plan import Plan
@@ -62,3 +65,19 @@ def test_their_c_gives_what_compensate_gives(tmp_path, dtype: str, bound: float)
     run = disturbed(5, jitter=0.3)
     out, _ = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
     np.testing.assert_allclose(out, model.compensate(run).compensated, atol=bound)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sine(T, 0 degC)",
+        "transition(T, 40 degC, 0 degC)",
+        "late_sine(T, 0 degC, 30 s)",
+        "sine(T, 1e-320 degC)",
+    ],
+)
+def test_numbers_that_make_none_are_told(text: str) -> None:
+    time = np.arange(100.0)
+    run = Run("r", {"time": time, "gyro": time, "T": 20.0 + time})
+    with pytest.raises(InputError, match=f"r: {re.escape(text)} .*state other numbers"):
+        make_model("polynomial", f"T, {text}").fit(run)

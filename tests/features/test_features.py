@@ -65,6 +65,17 @@ def test_columns_made_in_place_are_those_of_the_atom_values(run: Run, text: str,
         np.testing.assert_array_equal(part.columns[name], column)
 
 
+def test_what_was_not_measured_is_no_part_of_columns(run: Run) -> None:
+    features, T = Features("T1, dT1, lag(T1, 300 s)"), run.columns["T1"].copy()
+    T[500:520] = -273.15
+    gone = run.with_columns(T1=T)
+    rows = np.delete(np.arange(len(run)), np.arange(500, 520))
+    rest = Run.from_columns("rest", **{name: values[rows] for name, values in run.columns.items()})
+    found = features.transform(gone)
+    np.testing.assert_allclose(found[rows], features.transform(rest), atol=1e-9)
+    np.testing.assert_array_equal(found[500:520], np.tile(found[499], (20, 1)))
+
+
 def test_names_of_formulas_stand_for_recorded_sensors(run: Run) -> None:
     inner, outer = run.columns["T1"] + 0.5, run.columns["T2"]
     columns = parse_features("T, T_in, T_in-T_out, 2*T1-0.5*T2").transform(run)

@@ -124,6 +124,8 @@ def test_any_text_parses_or_is_refused_with_a_caret_within_it(text: str) -> None
         ("hysteresis(power)", 0, "not of a temperature"),
         ("beyond(T, 5 degC, 3 degC)", 10, "above the lower"),
         ("beyond(T, 5, 8 degC)", 11, "unit expected"),
+        ("beyond(T, -1e999 degC, 8 degC)", 11, "too large"),
+        ("sine(T, 1e999 degC)", 8, "too large"),
         ("T, beyond(T)", 11, "',' expected before the lower bound"),
         ("T*(hysteresis(T))", 3, "several features"),
         ("sign(d(power))", 5, "direction of a temperature only"),

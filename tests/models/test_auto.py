@@ -269,3 +269,12 @@ def test_stated_features_are_kept(linear_only: None) -> None:
     names = {c.name for c in trial.Trial([run], 0, "T, dT").candidates}
     assert names == {"mean", "T, dT", "RBF network of T, dT"}
     assert model.get_params()["features"] == "T, dT"
+
+
+def test_each_sensor_is_written_out(linear_only: None) -> None:
+    time = np.arange(0.0, 4000.0, 10.0)
+    inner = 20.0 * np.sin(time / 600.0)
+    run = Run.from_columns("a", time=time, gyro=0.1 * inner, T_in=inner, T_out=0.9 * inner + np.cos(time))
+    model = AutoModel(features="{sensor}").fit(run)
+    assert model.feature_names == ["T_in", "T_out"]
+    assert any(candidate["name"] == "T_in, T_out" for candidate in model.selection_)

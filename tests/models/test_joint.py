@@ -194,3 +194,12 @@ def test_memory_of_the_bias_stands_beside_the_scale_factor(tmp_path):
     np.testing.assert_array_equal(again.compensate(run).compensated, joint.compensate(run).compensated)
     with pytest.raises(InputError, match="joint-patent"):
         make_model("joint-patent", "lag(T, 1800 s)")
+
+
+def test_features_of_each_sensor_are_kept(tmp_path):
+    run = staircase(noise=0.05)
+    joint = make_model("joint", "lag({sensor}, 1800 s)").fit(run)
+    assert joint.column_names[-2:] == ["lag(T_in, 1800 s)", "lag(T_out, 1800 s)"]
+    save_model(joint, tmp_path / "model")
+    again = load_model(tmp_path / "model")
+    np.testing.assert_array_equal(again.compensate(run).compensated, joint.compensate(run).compensated)

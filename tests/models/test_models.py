@@ -244,3 +244,16 @@ def test_what_is_no_run_is_told_as_that() -> None:
         with pytest.raises(InputError, match=rf"needed, found {found}"):
             call()
     assert str(judge(model, run, run)).startswith("polynomial, judged\na: rms")
+
+
+def test_a_sensor_stands_in_calls_of_several_arguments_too(train):
+    features = resolve_features(
+        "lag({sensor}, 600 s), T*dT[slope, 60 s], play({sensor}, 4 degC)^1..2", [train]
+    )
+    assert features.names() == [
+        "T*dT[slope, 60 s]",
+        *[f"{text.format(name)}" for name in ("T_in", "T_out") for text in EACH],
+    ]
+
+
+EACH = ("lag({}, 600 s)", "play({}, 4 degC)", "play({}, 4 degC)^2")

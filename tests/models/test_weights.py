@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from fogml.features.features import Features
 from fogml.models.box import direction_is_told
-from fogml.models.combination import LeftOut
+from fogml.models.combination import LeftOut, combined
+from fogml.models.linear import LinearRegressor
 from fogml.models.table import TrainingTable
 from fogml.models.weights import intervals_of, skill_of, weights_of
 
@@ -132,3 +134,12 @@ def test_what_a_direction_left_out_tells_counts_as_of_a_fit_to_both():
         left.append(y[held] - predicted)
     assert np.std(left) > 4.0 * noise
     assert np.mean(widths) == pytest.approx(2.0**0.5 * norm.ppf(0.95) * noise, rel=0.15)
+
+
+@pytest.mark.parametrize("weights", [[0.5, 0.5], [0.2, 0.6], [1.0, 0.0]])
+def test_a_model_weighed_with_itself_is_as_uncertain_as_that_model(weights):
+    rng = np.random.default_rng(2)
+    T = rng.normal(size=200)
+    one = LinearRegressor().fit(T[:, None], 2.0 * T + rng.normal(size=200))
+    _, both = combined([(Features("T"), one)] * 2, np.array(weights), 0.0)
+    np.testing.assert_allclose(both.standard_errors(), sum(weights) * one.standard_errors())

@@ -212,3 +212,25 @@ def test_each_part_of_a_single_run_is_held_out_once(runs, monkeypatch):
 def test_the_search_where_nothing_can_be_fitted(runs):
     with pytest.raises(InputError, match="T_in"):
         train_until_index(runs[:2], 0.03, model="M3")
+
+
+def test_turns_of_the_table_are_no_noise_that_puts_an_index_out_of_reach():
+    """White noise of 1 deg/h a second leaves 0.1 in 100 s; one that lags its table is off by 1e4 in turns."""
+    time = np.arange(0.0, 20000.0)
+    rate = 10.0 * np.where(time // 500 % 2 == 1, np.where(time // 1000 % 2 == 0, 1.0, -1.0), 0.0)
+    seen = np.convolve(rate, np.exp(-np.arange(10.0) / 1.5) / np.exp(-np.arange(10.0) / 1.5).sum())[
+        : len(time)
+    ]
+    temperature = 30.0 * np.sin(2 * np.pi * time / 6000.0)
+    noise = np.random.default_rng(0).normal(size=len(time))
+    run = Run.from_columns(
+        "t.csv", time=time, gyro=3600.0 * seen + 0.02 * temperature + noise, T=temperature, rate=rate
+    )
+    found = train_until_index(run, 0.2, model="polynomial", features="T")
+    assert found.out_of_reach is None
+    assert found.chosen is not None and found.met
+
+
+def test_an_index_below_the_noise_is_told_of_runs_left_out_too(runs):
+    (judgement,) = compare(makers("M1"), runs, None, design_index=1e-3).judgements.values()
+    assert sum("No model can reach the design index" in note for note in judgement.notes) == len(runs)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.models.names import make_model
 from fogml.runs.facts import EARTH_RATE_DEG_H, Facts
 from fogml.runs.run import Run
 from fogml.validation.judge import judge
@@ -182,3 +183,14 @@ def test_the_floor_counts_the_samples_that_averages_hold():
     ):
         assert judged.after.bias_stability == pytest.approx(2.0 / np.sqrt(60.0), rel=0.1)
         assert judged.floor == pytest.approx(2.0 / np.sqrt(60.0), rel=0.04)
+
+
+@pytest.mark.parametrize("memory", ["lag(T, 3600 s)", "play(T, 15 degC)"])
+def test_what_is_outside_counts_while_a_memory_settles(memory):
+    time = np.arange(0.0, 7200.0, 4.0)
+    held = 25.0 + 20.0 * np.sin(2.0 * np.pi * time / 7200.0)
+    train = Run.from_columns("a.csv", time=time, gyro=0.1 * held, T=held)
+    test = Run.from_columns("b.csv", time=time, gyro=0.1 * (held + 60.0), T=held + 60.0)
+    (run,) = judge(make_model("polynomial", f"T, {memory}").fit(train), train, test).test
+    assert run.not_settled > 0.1
+    assert run.outside_training == 1.0

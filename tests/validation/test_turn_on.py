@@ -84,3 +84,11 @@ def test_an_average_at_power_on_counts():
     time, values = 10.0 * np.arange(8), np.array([1.0, *np.zeros(7)])
     assert turn_on_time(time, values, 0.0, 0.5, 10.0) == pytest.approx(5.0)
     assert turn_on_time(time, values, 1.0, 0.5, 10.0) is None
+
+
+def test_a_bias_that_is_settled_where_its_last_quarter_begins_has_a_time():
+    time, values = 10.0 * np.arange(16), np.repeat([2.0, 0.0], [12, 4])
+    # From 2 down to the band of 0.5 between two averages: three quarters of the way.
+    assert turn_on_time(time, values, 0.0, 0.5, 10.0) == pytest.approx(117.5)
+    values[12] = 2.0
+    assert turn_on_time(time, values, 0.0, 0.5, 10.0) == np.inf
