@@ -106,6 +106,7 @@ def fit_and_judge(
                 features=settings.features,
                 averaging_s=settings.averaging,
                 seed=settings.seed,
+                parameters=settings.parameters,
                 step=work.doing,
             )
             model = found.model

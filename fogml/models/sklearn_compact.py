@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from io import BytesIO
 from typing import Any, NamedTuple
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -274,6 +276,10 @@ def _trusted(data: bytes) -> list[str]:
     import skops.io
 
     try:
+        with ZipFile(BytesIO(data)) as archive:
+            # skops packs nothing, and what is packed may unpack to any size.
+            if sum(held.file_size for held in archive.infolist()) > len(data):
+                raise ValueError("it unpacks to more than it is")
         named = skops.io.get_untrusted_types(data=data)
     except Exception as error:  # as above
         raise InputError(

@@ -8,10 +8,10 @@ index is met there; the test run is judged once, by what was found.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -40,11 +40,12 @@ PARTS = 5
 
 @dataclass(frozen=True)
 class Candidate:
-    """One thing to try: a model by name, its features, and the centres of a network."""
+    """One thing to try: a model by name, its features, the centres of a network, and other parameters."""
 
     model: str
     features: str | None
     centres: int | None = None
+    parameters: Mapping[str, Any] | None = None
 
     @property
     def name(self) -> str:
@@ -57,7 +58,7 @@ class Candidate:
         """The unfitted model."""
         from fogml.models.names import make_model
 
-        model = make_model(self.model, self.features, seed)
+        model = make_model(self.model, self.features, seed, self.parameters)
         return model if self.centres is None else model.set_params(regressor__centres=self.centres)
 
 
@@ -124,6 +125,7 @@ def train_until_index(
     features: str | None = None,
     averaging_s: float = AVERAGING_S,
     seed: int = 0,
+    parameters: Mapping[str, Any] | None = None,
     step: Callable[[str], None] | None = None,
 ) -> IndexSearch:
     """Try sizes and features until the design index is met on folds of the training runs.
@@ -147,22 +149,27 @@ def train_until_index(
         Averaging time [s].
     seed
         Seed of the networks.
+    parameters
+        Of the regressor, as `fogml.models.names.make_model` takes them; stated centres alone are tried.
     step
         Called with what is tried next.
 
     Raises
     ------
     InputError
-        If no candidate can be fitted.
+        If no candidate can be fitted, or the parameters are none of the model's.
     """
     group = runs_of(runs)
+    asked = Candidate(model, features, parameters=parameters)
+    if parameters:
+        asked.make(seed)  # which refuses what does not go together
     beyond = _out_of_reach(group, design_index, averaging_s)
     if beyond is not None:
         if step is not None:
             step(f"fitting {model}, as the design index is out of reach")
-        return IndexSearch(Candidate(model, features).make(seed).fit(group), None, (), design_index, beyond)
+        return IndexSearch(asked.make(seed).fit(group), None, (), design_index, beyond)
     trials: list[Trial] = []
-    for candidate in candidates(model, features):
+    for candidate in candidates(model, features, parameters):
         if step is not None:
             step(f"try {len(trials) + 1}: {candidate.name}")
         trials.append(_try(candidate, group, averaging_s, seed))
@@ -189,16 +196,21 @@ def _out_of_reach(runs: Sequence[Run], design_index: float, averaging_s: float) 
     return out_of_reach(design_index, floors, averages, averaging_s, "the training runs")
 
 
-def candidates(model: str, features: str | None) -> list[Candidate]:
+def candidates(
+    model: str, features: str | None, parameters: Mapping[str, Any] | None = None
+) -> list[Candidate]:
     """What is tried for a model's name, from small to large."""
-    polynomials = [Candidate("polynomial", text) for text in ([features] if features else FEATURE_LADDER)]
+    polynomials = [
+        Candidate("polynomial", text, parameters=parameters)
+        for text in ([features] if features else FEATURE_LADDER)
+    ]
     networks = [
-        Candidate("rbf", text, size)
-        for size in SIZES
+        Candidate("rbf", text, size, parameters)
+        for size in ([None] if parameters and "centres" in parameters else SIZES)
         for text in ([features] if features else NETWORK_FEATURES)
     ]
     families = {"auto": [*polynomials, *networks], "polynomial": polynomials, "rbf": networks}
-    return families.get(model, [Candidate(model, features)])
+    return families.get(model, [Candidate(model, features, parameters=parameters)])
 
 
 def _try(candidate: Candidate, runs: Sequence[Run], averaging_s: float, seed: int) -> Trial:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import pickle
 import shutil
 import warnings
+import zipfile
 
 import numpy as np
 import pytest
@@ -410,6 +412,14 @@ class TestScikitLearn:
         data = load_file(folder / "weights.safetensors")["skops"].tobytes()
         self.swap(folder, data[: len(data) // 2])
         with pytest.raises(InputError, match="cannot be read"):
+            load_model(folder)
+
+    def test_what_unpacks_to_more_than_it_is_is_refused(self, folder):
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("schema.json", " " * (1 << 20))
+        self.swap(folder, packed.getvalue())
+        with pytest.raises(InputError, match="unpacks to more than it is"):
             load_model(folder)
 
     def test_another_type_than_a_regressor_is_refused(self, folder):

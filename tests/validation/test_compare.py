@@ -234,3 +234,12 @@ def test_turns_of_the_table_are_no_noise_that_puts_an_index_out_of_reach():
 def test_an_index_below_the_noise_is_told_of_runs_left_out_too(runs):
     (judgement,) = compare(makers("M1"), runs, None, design_index=1e-3).judgements.values()
     assert sum("No model can reach the design index" in note for note in judgement.notes) == len(runs)
+
+
+def test_stated_parameters_are_those_of_every_candidate(runs):
+    found = train_until_index(runs[:2], 0.03, model="polynomial", features="T", parameters={"ridge": 0.5})
+    assert found.model.regressor_.ridge_ == 0.5
+    tried = candidates("rbf", "T", {"centres": 12, "tune": False})
+    assert [one.make(0).regressor.get_params()["centres"] for one in tried] == [12]
+    with pytest.raises(InputError, match="'auto' takes no parameters"):
+        train_until_index(runs[:2], 0.03, parameters={"ridge": 0.5})
