@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from fogml.cli.model_commands import CompareSettings
+from fogml.cli.runs import Check, no_check
 from fogml.cli.terminal import Terminal
 from fogml.cli.train_job import check_settings, noise_run, split_runs
 from fogml.errors import InputError
@@ -18,12 +19,15 @@ from fogml.validation.report_json import comparison_json
 _OWN_CHOICE = ("auto", "polynomial", "rbf")
 
 
-def compare_and_write(settings: CompareSettings, terminal: Terminal) -> bool:
-    """Fit and judge every model, write the results, print them; whether some model meets the limits."""
+def compare_and_write(settings: CompareSettings, terminal: Terminal, check: Check = no_check) -> bool:
+    """Fit and judge every model, write the results, print them; whether some model meets the limits.
+
+    `check` is called with the runs before a model is fitted.
+    """
     check_settings(settings)
     makers = _makers(settings)
     with whole_folder(settings.out) as folder:
-        comparison = _compare(settings, makers, terminal)
+        comparison = _compare(settings, makers, terminal, check)
         values = comparison_json(comparison)
         write_json(folder / "compare.json", values)
         with terminal.work("drawing"):
@@ -54,10 +58,13 @@ def _makers(settings: CompareSettings) -> dict[str, partial]:
     return makers
 
 
-def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Terminal) -> Comparison:
+def _compare(
+    settings: CompareSettings, makers: dict[str, partial], terminal: Terminal, check: Check
+) -> Comparison:
     if settings.leave_one_out == bool(settings.test):
         raise InputError("give test runs after --test, or --leave-one-out without --test")
     train_runs, test_runs = split_runs(settings, terminal)
+    check((*train_runs, *test_runs))
     noise = noise_run(settings, terminal)
     fits = len(makers) * (1 if test_runs else len(train_runs) + 1)
     with terminal.work("comparing", total=fits) as work:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from fogml.cli.from_diagnosis import not_compensated, with_brought
-from fogml.cli.runs import open_run, open_runs
+from fogml.cli.runs import Check, no_check, open_noise, open_runs
 from fogml.cli.terminal import Terminal
 from fogml.cli.twin_commands import DiagnoseSettings
 from fogml.errors import InputError
@@ -97,19 +97,23 @@ WHAT_IF = "what-if.html"
 """The page on which the sizes of effects are moved."""
 
 
-def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagnosis | UnitsDiagnosis:
+def diagnose_and_write(
+    settings: DiagnoseSettings, terminal: Terminal, check: Check = no_check
+) -> Diagnosis | UnitsDiagnosis:
     """Diagnose, write ``gap.json``, ``gap.html`` and ``twin.yaml``, and print the verdict.
 
-    Of runs of several units each has them in a folder of its own, beside ``units.json`` and its page.
+    Of runs of several units each has them in a folder of its own, beside ``units.json`` and its page. `check`
+    is called with the runs before they are diagnosed.
     """
     both = sorted(set(settings.runs) & set(settings.held_out))
     if both:
         raise InputError(f"{', '.join(both)}: both a fit run and held out; hold out another run")
     model = TwinModel(load_twin(settings.twin))
     with whole_folder(settings.out) as folder:
-        runs = open_runs(settings.runs, terminal, repair=settings.repair)
-        held_out = open_runs(settings.held_out, terminal, repair=settings.repair) if settings.held_out else []
-        noise = open_run(settings.noise, repair=settings.repair) if settings.noise else None
+        runs = open_runs(settings.runs, terminal, repair=settings.repair, beside=settings.held_out)
+        held_out = open_runs(settings.held_out, terminal, repair=settings.repair, beside=settings.runs)
+        check((*runs, *held_out))
+        noise = open_noise(settings.noise, terminal, repair=settings.repair)
         recorded, kept_back = runs, held_out
         column = _column(settings, model, runs, held_out, terminal)
         if column is not None:

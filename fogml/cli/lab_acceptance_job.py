@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fogml.cli.lab import AcceptanceSettings, BatchSettings
-from fogml.cli.runs import open_runs, tell
+from fogml.cli.runs import Check, no_check, open_noise, open_runs, tell
 from fogml.cli.terminal import Terminal
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
-    from fogml.runs.run import Run
 
 
 def acceptance_and_write(settings: AcceptanceSettings, terminal: Terminal) -> bool:
@@ -30,7 +29,7 @@ def write_report(
     settings: AcceptanceSettings,
     terminal: Terminal,
     model_of: Callable[[], DriftModel | None],
-    check: Callable[[Sequence[Run]], None] = lambda runs: None,
+    check: Check = no_check,
 ) -> dict[str, Any]:
     """The report of the runs that are named, written where a folder is named, and printed.
 
@@ -52,9 +51,7 @@ def write_report(
         runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
         model = model_of()
         check(runs)
-        noise = None
-        if settings.noise is not None:
-            (noise,) = open_runs([settings.noise], terminal, repair=settings.repair, axis=settings.axis)
+        noise = open_noise(settings.noise, terminal, repair=settings.repair, axis=settings.axis)
         with terminal.work("testing"):
             return acceptance_json(
                 runs,

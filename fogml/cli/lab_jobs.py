@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fogml.cli.lab import WAYS, MisalignmentSettings, NorthSettings, RateSettings
-from fogml.cli.runs import open_run, tell
+from fogml.cli.runs import open_each, open_run, tell
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, known_are
 from fogml.lab.misalignment_input import read_measurements
@@ -55,7 +55,7 @@ def _values(settings: RateSettings, terminal: Terminal) -> dict[str, Any]:
     )
     if settings.twin is None:
         with terminal.work("reading"):
-            runs = [open_run(path, repair=settings.repair) for path in settings.runs]
+            runs = open_each(settings.runs, repair=settings.repair)
         source = ", ".join(run.name for run in runs)
         return rate_json(runs, source=source, settle_s=settings.settle, criteria=criteria)
     from fogml.lab.rate_programmes import rate_runs

@@ -137,11 +137,6 @@ def _expected_rows(run: str) -> float | None:
     return path.stat().st_size / len(head) * lines if lines else None
 
 
-if TYPE_CHECKING:
-    from fogml.models.base import DriftModel
-    from fogml.runs.run import Run
-
-
 def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[str, Any]:
     """Export a model into ``settings.out``, whole or not at all, and print what came of it."""
     from fogml.export.c_axes import export_axes

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.cli.run_commands import ImportSettings, InspectSettings, NoiseSettings
-from fogml.cli.runs import check_named_once, most_dropped, open_run, open_runs, tell
+from fogml.cli.runs import most_dropped, open_each, open_runs, tell
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.numerals import duration, number, percent
@@ -210,12 +210,8 @@ def _for_others(settings: NoiseSettings, values: dict[str, Any]) -> list[tuple[s
 
 def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
     paths = [settings.run] if isinstance(settings.run, str) else list(settings.run or ())
-    check_named_once(paths)
     with terminal.work(f"reading {paths[0]}") as work:
-        runs = []
-        for path in paths:
-            work.doing(f"reading {path}")
-            runs.append(open_run(path, repair=settings.repair, axis=settings.axis))
+        runs = open_each(paths, repair=settings.repair, axis=settings.axis, doing=work.doing)
         work.doing("averaging")
         values = noise_report(runs, overlapping=settings.overlapping)
         told = [

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +18,13 @@ from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
 from fogml.runs.findings import DEAD, FIRST_OF_ALL
 from fogml.runs.run import Run
+
+Check = Callable[[Sequence[Run]], None]
+"""Refuses runs that are not those a job is meant to have."""
+
+
+def no_check(runs: Sequence[Run]) -> None:
+    """A check that every run passes."""
 
 
 def shipped_places() -> list[str]:
@@ -61,16 +71,64 @@ def most_dropped(repair: Repairing) -> float:
 
 
 def check_named_once(paths: Sequence[str]) -> None:
-    """Hold that no run is named twice."""
-    twice = sorted({path for path in paths if list(paths).count(path) > 1})
+    """Hold that no run is named twice, however its path is written."""
+    named = Counter(map(os.path.abspath, paths))
+    twice = dict.fromkeys(path for path in paths if named[os.path.abspath(path)] > 1)
     if twice:
         raise InputError(f"{', '.join(twice)}: named more than once; give each run once")
 
 
+def folders_apart(paths: Sequence[str]) -> dict[str, str]:
+    """Of each path the folders that tell it from other files of its name, as ``cold/``; empty where none are.
+
+    Figures of runs are told by the runs' names, so that two of one name would be taken for each other.
+    """
+    by_name: dict[str, dict[str, tuple[str, ...]]] = defaultdict(dict)
+    for path in paths:
+        by_name[Path(path).name][path] = Path(os.path.abspath(path)).parts
+    found = dict.fromkeys(paths, "")
+    for parts in by_name.values():
+        files = set(parts.values())
+        depth = next(deep for deep in count(1) if len({file[-deep:] for file in files}) == len(files))
+        if depth > 1:
+            found |= {path: f"{Path(*own[-depth:-1]).as_posix()}/" for path, own in parts.items()}
+    return found
+
+
+def _within(folders: str, run: Run) -> Run:
+    """The run with folders before its name."""
+    if not folders:
+        return run
+    return Run.derived(folders + run.name, run.columns, run.facts, run.gyro_unit, run.findings)
+
+
+def open_each(
+    paths: Sequence[str],
+    *,
+    repair: Repairing = False,
+    axis: str | None = None,
+    doing: Callable[[str], None] = lambda words: None,
+) -> list[Run]:
+    """The one run in each of several files, as `open_run`; those of one name are told apart by folders."""
+    check_named_once(paths)
+    folders, runs = folders_apart(paths), []
+    for path in paths:
+        doing(f"reading {path}")
+        runs.append(_within(folders[path], open_run(path, repair=repair, axis=axis)))
+    return runs
+
+
 def open_runs(
-    paths: Sequence[str], terminal: Terminal, *, repair: Repairing = False, axis: str | None = None
+    paths: Sequence[str],
+    terminal: Terminal,
+    *,
+    repair: Repairing = False,
+    axis: str | None = None,
+    beside: Sequence[str] = (),
 ) -> list[Run]:
     """The runs in several files; findings are noted on stderr.
+
+    Runs of files of one name, those `beside` among them, are told apart by their folders.
 
     Raises
     ------
@@ -78,16 +136,32 @@ def open_runs(
         If a file is named twice.
     """
     check_named_once(paths)
+    folders = folders_apart([*paths, *beside])
     runs: list[Run] = []
     with terminal.work("reading", total=len(paths)) as work:
         for path in paths:
             work.doing(f"reading {path}")
-            runs += open_legs(path, repair=repair, axis=axis)
+            runs += [_within(folders[path], run) for run in open_legs(path, repair=repair, axis=axis)]
             work.advance()
+    _note_findings(runs, terminal)
+    return runs
+
+
+def open_noise(
+    path: str | None, terminal: Terminal, *, repair: Repairing = False, axis: str | None = None
+) -> Run | None:
+    """The static run that tells a unit's noise, where one is named; findings are noted on stderr."""
+    if path is None:
+        return None
+    run = open_run(path, repair=repair, axis=axis)
+    _note_findings([run], terminal)
+    return run
+
+
+def _note_findings(runs: Sequence[Run], terminal: Terminal) -> None:
     noticed = [(run.name, finding) for run in runs for finding in run.findings]
     for name, finding in sorted(noticed, key=lambda one: one[1].code not in FIRST_OF_ALL):
         terminal.note(f"{name}: {finding.message}")
-    return runs
 
 
 def note_wrong(first: Run, terminal: Terminal) -> None:

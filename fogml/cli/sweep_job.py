@@ -60,8 +60,8 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
     from fogml.tuning.sweep import run_sweep, study_json
 
     tracker = None if settings.track is None else Tracker(settings.track, "fogml sweep", terminal.note)
-    runs = open_runs(settings.runs, terminal, repair=settings.repair)
-    test_runs = open_runs(settings.test, terminal, repair=settings.repair) if settings.test else []
+    runs = open_runs(settings.runs, terminal, repair=settings.repair, beside=settings.test)
+    test_runs = open_runs(settings.test, terminal, repair=settings.repair, beside=settings.runs)
     with terminal.work("sweeping", total=settings.trials) as work:
         study = run_sweep(
             plan_of(settings, runs),

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fogml.cli.from_diagnosis import unfitted_model
 from fogml.cli.model_commands import TrainSettings
-from fogml.cli.options import LimitSettings
-from fogml.cli.runs import open_runs
+from fogml.cli.runs import open_noise, open_runs
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
@@ -59,33 +58,41 @@ def check_settings(settings: TrainSettings | CompareSettings) -> None:
         parse_features(settings.features)
     if isinstance(settings, TrainSettings):
         unfitted_model(settings)
+        if settings.train_again and settings.design_index is None:
+            raise InputError("--train-again needs a --design-index to reach")
+        if settings.train_again and settings.parameters:
+            raise InputError("--set: --train-again looks for sizes itself; leave one of them out")
 
 
 def split_runs(settings: TrainSettings | CompareSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:
     """The training runs and the test runs, read and checked."""
-    train_runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
-    test_runs = open_runs(settings.test, terminal, repair=settings.repair, axis=settings.axis)
+    reading = partial(open_runs, terminal=terminal, repair=settings.repair, axis=settings.axis)
+    train_runs = reading(settings.runs, beside=settings.test)
+    test_runs = reading(settings.test, beside=settings.runs)
     check_turn_on_band(settings.turn_on_band, (*train_runs, *test_runs))
     if settings.strict:
         hold_strict([(run.name, run.findings) for run in (*train_runs, *test_runs)])
     return train_runs, test_runs
 
 
-def noise_run(settings: LimitSettings, terminal: Terminal) -> Run | None:
+def noise_run(settings: TrainSettings | CompareSettings, terminal: Terminal) -> Run | None:
     """The static run that makes the floor, read and checked; None where none is named."""
-    if settings.noise is None:
-        return None
-    from fogml.validation.floors import check_noise_run
+    run = open_noise(settings.noise, terminal, repair=settings.repair, axis=settings.axis)
+    if run is not None:
+        from fogml.validation.floors import check_noise_run
 
-    (run,) = open_runs([settings.noise], terminal, axis=getattr(settings, "axis", None))
-    check_noise_run(run)
+        check_noise_run(run)
     return run
 
 
 def fit_and_judge(
-    settings: TrainSettings, train_runs: list[Run], test_runs: list[Run], terminal: Terminal
+    settings: TrainSettings,
+    train_runs: list[Run],
+    test_runs: list[Run],
+    terminal: Terminal,
+    unfitted: DriftModel | None = None,
 ) -> tuple[DriftModel, Judgement]:
-    """The fitted model and its judgement."""
+    """The fitted model and its judgement; of `unfitted` where given, else of what the settings name."""
     notes = [
         f"{test.name} is the training run {trained.name}: its figures say nothing of a run not trained on"
         for test in test_runs
@@ -97,8 +104,7 @@ def fit_and_judge(
         if settings.train_again:
             from fogml.validation.index_search import train_until_index
 
-            if settings.design_index is None:
-                raise InputError("--train-again needs a --design-index to reach")
+            assert settings.design_index is not None
             found = train_until_index(
                 train_runs,
                 settings.design_index,
@@ -112,7 +118,7 @@ def fit_and_judge(
             model = found.model
             notes.append(found.summary())
         else:
-            model = fit(unfitted_model(settings), train_runs, work)
+            model = fit(unfitted or unfitted_model(settings), train_runs, work)
         others: dict[str, DriftModel] = {}
         if settings.from_diagnosis is not None:
             from fogml.cli.from_diagnosis import not_compensated, read_compensation
@@ -140,7 +146,8 @@ def fit_and_judge(
         )
         beside = {name: judging(other, beside=[model]).test for name, other in others.items()}
         judgement = replace(judgement, beside=beside)
-        if "lag(" not in (settings.features or "") and (lag := lag_note(train_runs, test_runs)) is not None:
+        asked = getattr(unfitted, "features", settings.features) or ""
+        if "lag(" not in asked and (lag := lag_note(train_runs, test_runs)) is not None:
             judgement = replace(judgement, notes=(*judgement.notes, lag))
     if settings.strict:
         hold_strict([(run.run, run.findings) for run in judgement.test])

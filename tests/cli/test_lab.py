@@ -56,6 +56,14 @@ def positions(tmp_path: Path) -> Path:
     return path
 
 
+def test_a_noise_run_of_several_legs_is_refused_and_named(run_files, tmp_path: Path, invoke) -> None:
+    legs = tmp_path / "legs.csv"
+    first, second = (path.read_text().splitlines() for path in run_files)
+    legs.write_text("\n".join([*first, *second[1:]]))
+    told = invoke("lab", "acceptance", run_files[0], "--noise", legs, "--repair", status=2).stderr
+    assert "legs.csv" in told and "one run is needed here" in told
+
+
 def test_misalignment(turns: Path, tmp_path: Path, invoke, invoke_json) -> None:
     told = invoke_json("lab", "misalignment", turns)
     assert told["schema"] == "fogml.misalignment/1" and set(MISALIGNMENT_KEYS) <= set(told)

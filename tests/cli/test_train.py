@@ -8,6 +8,10 @@ import sys
 import pytest
 import yaml
 
+from fogml.numerals import number
+from tests.cli.conftest import csv_text
+from tests.report.pages import Page
+
 QUICK = ("--model", "polynomial", "--features", "T, dT")
 
 
@@ -37,6 +41,35 @@ def test_quiet_prints_nothing(invoke, run_files, tmp_path):
     train, test = run_files
     result = invoke("train", train, "--test", test, *QUICK, "-o", tmp_path / "out", "--quiet")
     assert (result.stdout, result.stderr) == ("", "")
+
+
+def test_runs_of_one_name_are_told_apart_by_their_folders(invoke, invoke_json, run_files, tmp_path):
+    train, test = run_files
+    for seed, folder in enumerate(("cold", "hot"), 1):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "a.csv").write_text(csv_text(seed, low=5.0 * seed))
+    tests = [tmp_path / folder / "a.csv" for folder in ("cold", "hot")]
+    out = tmp_path / "out"
+    told = invoke_json("compare", train, "--test", *tests, "--models", "none,polynomial", "--out", out)
+    judged = told["models"]["polynomial"]["test"]
+    assert [run["run"] for run in judged] == ["cold/a.csv", "hot/a.csv"]
+    # A row of the page's table by run holds a figure of each.
+    row = " ".join(number(run["after"]["rms"]) for run in judged)
+    assert f"polynomial {row}" in Page((out / "compare.html").read_text()).text
+    named = invoke("compare", train, "--test", test, f"{tmp_path}/./b.csv", "--out", out, status=2)
+    assert "named more than once; give each run once" in named.stderr
+
+
+def test_a_faulty_noise_run_is_repaired_as_the_others_are(invoke, invoke_json, run_files, tmp_path):
+    train, test = run_files
+    rows = csv_text(7).splitlines()
+    time, _, temperature = rows[40].split(",")
+    rows[40] = f"{time},nan,{temperature}"
+    noise = tmp_path / "noise.csv"
+    noise.write_text("\n".join(rows))
+    arguments = ("train", train, "--test", test, *QUICK, "--noise", noise, "-o", tmp_path / "out")
+    assert "--repair drops the rows" in invoke(*arguments, status=2).stderr
+    assert invoke_json(*arguments, "--repair")["test"][0]["floor_source"].endswith("noise.csv")
 
 
 def test_an_unmet_design_index_is_status_1_and_everything_is_written(invoke, run_files, tmp_path):
@@ -121,6 +154,8 @@ def test_train_again_searches_on_training_folds(invoke_json, invoke, run_files, 
     report = invoke_json(*arguments, "--train-again", "--design-index", "0.2")
     assert any("folds of the training runs" in note for note in report["notes"])
     assert report["design_index"]["met"] is True
+    result = invoke(*arguments, "--train-again", "--design-index", 1, "--set", "ridge=1e-6", status=2)
+    assert "--set: --train-again looks for sizes itself" in result.stderr
     result = invoke(*arguments, "--train-again", status=2)
     assert "--design-index" in result.stderr
 
