@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date as Date
@@ -9,6 +10,7 @@ from datetime import date as Date
 import numpy as np
 from markupsafe import Markup
 
+from fogml.errors import InputError
 from fogml.numerals import averages, listed, number, percent, short, unit_of
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
@@ -27,6 +29,7 @@ from fogml.report.verdict import (
 from fogml.signals.drawn import drawn
 from fogml.validation.advice import advice_on
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
+from fogml.validation.limits import outcome_of
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
 _POINTS = 700
@@ -91,24 +94,19 @@ def by_unit(judgement: Judgement) -> list[Judgement]:
             replace(
                 judgement,
                 test=tuple(runs),
-                design_index=_again("rms", index, runs) if index else None,
-                limits=tuple(
-                    outcome
-                    for outcome in (_again(limit.quantity, limit, runs) for limit in judgement.limits)
-                    if outcome is not None
-                ),
+                design_index=_again(index, runs) if index else None,
+                limits=tuple(_again(limit, runs) for limit in judgement.limits),
             )
         )
     return parts
 
 
-def _again(quantity: str, stated: LimitOutcome, runs: Sequence[RunJudgement]) -> LimitOutcome | None:
-    """A limit looked at for some runs only; None where none of them tells the quantity."""
-    told = [getattr(run.after, quantity) for run in runs]
-    values = [abs(value) for value in told if value is not None]
-    if not values:
-        return None
-    return replace(stated, value=max(values), met=max(values) <= stated.limit)
+def _again(stated: LimitOutcome, runs: Sequence[RunJudgement]) -> LimitOutcome:
+    """A limit looked at for some runs only; not met, at no value, where none of them tells the quantity."""
+    try:
+        return outcome_of(stated.quantity, stated.limit, runs)
+    except InputError:
+        return replace(stated, value=math.nan, met=False)
 
 
 def _sheet(judgement: Judgement) -> Sheet:

@@ -44,12 +44,16 @@ def test_a_limit_is_met_at_the_limit_and_looks_at_the_size() -> None:
     assert [part.limits[0].met for part in parts] == [True, False]
 
 
-def test_a_unit_that_does_not_tell_a_quantity_has_no_such_limit() -> None:
+def test_a_unit_that_does_not_tell_a_quantity_does_not_meet_its_limit() -> None:
     judged = two_units()
     limit = replace(judged.limits[0], quantity="hysteresis", limit=0.01)
     silent = replace(judged.test[1], after=replace(judged.test[1].after, hysteresis=None))
     parts = by_unit(replace(judged, test=(judged.test[0], silent), limits=(limit,)))
-    assert [len(part.limits) for part in parts] == [1, 0]
+    assert [part.met for part in parts] == [True, False]
+    (told,) = parts[1].limits
+    assert (told.quantity, told.limit, told.met) == ("hysteresis", 0.01, False) and np.isnan(told.value)
+    text = Page(certificate(replace(judged, test=(judged.test[0], silent), limits=(limit,)))).text
+    assert "Thermal hysteresis 0.01 – deg/h ✗ not met" in text
 
 
 def test_the_sheet_states_what_is_certified() -> None:
