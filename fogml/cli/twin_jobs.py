@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections import Counter
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -47,7 +49,7 @@ def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
     if not settings.out:
         raise InputError("no --out is given; name the run to write, .csv or .parquet")
     out = Path(settings.out)
-    if settings.truth is not None and Path(settings.truth).absolute() == out.absolute():
+    if settings.truth is not None and os.path.abspath(settings.truth) == os.path.abspath(out):
         raise InputError(f"{out}: is the run and the truth; choose another --truth")
     programme, twin = load_programme(settings.programme), load_twin(settings.twin)
     facts = default_facts(programme) if settings.facts is None else facts_from(settings.facts, "facts")
@@ -114,8 +116,11 @@ def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
             raise InputError(f"'{key}' is stated for the file and there are 'runs'; state it in each of them")
     twin, before = load_twin(settings.twin), None
     outs = [Path(run.out) for run in settings.runs]
-    if len({out.absolute() for out in outs}) < len(outs):
-        raise InputError("runs: two of them are written to the same 'out'")
+    written = Counter(os.path.abspath(path) for run in settings.runs for path in (run.out, run.truth) if path)
+    if twice := [path for path, times in written.items() if times > 1]:
+        raise InputError(
+            f"runs: two are written to {twice[0]}; give each 'out' and 'truth' its own name"
+        )
     kept = settings.storage
     storage = Storage(kept.temperature, kept.humidity, kept.power == "on")
     results = []
@@ -128,7 +133,7 @@ def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
             before = world_of(
                 programme,
                 twin,
-                run.sample_s or settings.sample_s,
+                settings.sample_s if run.sample_s is None else run.sample_s,
                 settings.seed + number,
                 run.columns or settings.columns,
                 facts.model_copy(update={"started": run.started}),

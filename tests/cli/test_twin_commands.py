@@ -244,17 +244,26 @@ def test_a_units_runs_in_one_file_and_a_replay_after_the_first(tmp_path, invoke_
     assert again["runs"] == told["runs"]
 
 
+START = "2026-03-02T08:00:00Z"
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"programme": STEPS}, "there are 'runs'; state it in each of them"),
         ({"storage": {"temperature": 300.0}}, "storage: temperature is 300"),
         ({"runs": [{"programme": STEPS, "out": "a.csv"}]}, "nothing is given for 'runs.0.started'"),
+        (
+            {"runs": [{"programme": STEPS, "out": "a.csv", "truth": "./b/../a.csv", "started": START}]},
+            "a.csv; give each 'out' and 'truth' its own name",
+        ),
+        ({"runs": [{"programme": STEPS, "out": "a.csv", "sample_s": 0.0, "started": START}]}, "0 s"),
     ],
 )
-def test_faulty_runs_are_refused(tmp_path, invoke, change, message):
+def test_faulty_runs_are_refused(tmp_path, invoke, monkeypatch, change, message):
+    monkeypatch.chdir(tmp_path)
     config = tmp_path / "runs.yaml"
-    run = {"programme": STEPS, "started": "2026-03-02T08:00:00Z", "out": str(tmp_path / "a.csv")}
+    run = {"programme": STEPS, "started": START, "out": str(tmp_path / "a.csv")}
     config.write_text(yaml.safe_dump({"schema": "fogml.simulate/1", "runs": [run], **change}))
     result = invoke("simulate", config, status=2)
     assert message in result.stderr
