@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -190,3 +191,15 @@ def duration(seconds: float) -> str:
     if seconds < 3 * 86400:
         return f"{number(seconds / 3600)} h"
     return f"{number(seconds / 86400)} d"
+
+
+def in_order_of_serial(label: str) -> list[tuple[int, int | str]]:
+    """Sort key of serial numbers: digits in a label count by the number that they are.
+
+    Examples
+    --------
+    >>> sorted(["FOG-10", "FOG-9"], key=in_order_of_serial)
+    ['FOG-9', 'FOG-10']
+    """
+    parts = re.findall(r"\d+|\D+", label)
+    return [(0, int(part)) if part.isdecimal() else (1, part) for part in parts]

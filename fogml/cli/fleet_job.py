@@ -16,7 +16,7 @@ from fogml.fleet.tasks import DONE, FLEET, Task, full_disk
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.locks import sole_writer
 from fogml.outputs import whole_folder
-from fogml.runs.sources import sources_stamp
+from fogml.runs.sources import run_sources, sources_stamp
 from fogml.tracking import Tracker
 
 
@@ -48,7 +48,7 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     """Do every unit's job, write the fleet's results, print them; whether all are done and meet limits."""
     assert settings.manifest
     units = read_manifest(settings.manifest)
-    _check(settings)
+    _check(settings, units)
     tasks = _tasks(settings, units)
     home = Path(settings.out)
     if home.exists() and not home.is_dir():
@@ -81,20 +81,17 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
 
 def _tasks(settings: FleetSettings, units: Sequence[Unit]) -> list[Task]:
     shared = None if settings.prior is None else _shared(settings.prior)
+    # Workers elsewhere find files by whole paths; results depend on what files hold, not on where they lie.
+    work = UnitWork(settings.in_full().for_units(), settings.form, shared)
     own = settings.for_units()
-    work = UnitWork(own, settings.form, shared)
-    # A twin is a file, or one that ships; limits are a file if there are any.
-    files = {"twin": settings.twin, "acceptance_limits": settings.acceptance_limits or ""}
-    stamps = {
-        f"{key} file": sources_stamp([Path(file)]) if Path(file).is_file() else None
-        for key, file in files.items()
-    }
-    told = {**own, "shared": shared, **stamps}
+    files = {key: own[key] for key in settings.path_keys if own.get(key) and Path(own[key]).is_file()}
+    stamps = {f"{key} file": sources_stamp(run_sources(file)) for key, file in files.items()}
+    told = {**own, **dict.fromkeys(files), "shared": shared, **stamps}
     # Units that are done are known by their settings: workers write into one folder, wherever they run.
     return [Task(unit, work, str(Path(settings.out).absolute()), told) for unit in units]
 
 
-def _check(settings: FleetSettings) -> None:
+def _check(settings: FleetSettings, units: Sequence[Unit]) -> None:
     """Check what can be checked before a run is read."""
     from fogml.features.parse import parse_features
     from fogml.models.names import make_model
@@ -104,9 +101,26 @@ def _check(settings: FleetSettings) -> None:
         from fogml.lab.acceptance_rows import read_limits
 
         read_limits(settings.acceptance_limits)
+    if settings.prior is not None:
+        _check_prior(settings, units)
     if settings.device is not None:
         _check_device(settings)
     make_model(settings.model, settings.features, settings.seed, settings.for_units()["parameters"])
+
+
+def _check_prior(settings: FleetSettings, units: Sequence[Unit]) -> None:
+    """Hold that there are models to be drawn to the fleet's, and that nothing else says what they are."""
+    if not any(unit.job == "train" for unit in units):
+        raise InputError("--prior: is for the job 'train', which no unit of the manifest has; leave it out")
+    others = {
+        "--model": settings.model != "auto",
+        "--features": settings.features is not None,
+        "--set": bool(settings.parameters),
+        "--device": settings.device is not None,
+    }
+    for name, given in others.items():
+        if given:
+            raise InputError(f"{name}: with --prior the earlier fleet makes the model; leave one of them out")
 
 
 def _shared(path: str) -> dict[str, Any]:

@@ -53,12 +53,10 @@ class UnitWork:
             TrainSettings,
             check_settings,
             fit_and_judge,
-            noise_run,
             split_runs,
             write_results,
         )
         from fogml.outputs import whole_folder
-        from fogml.validation.judge import judge
 
         terminal = Terminal(quiet=True)
         settings = self._for(TrainSettings, unit, folder, runs=list(unit.train), test=list(unit.test))
@@ -66,22 +64,12 @@ class UnitWork:
         with whole_folder(folder) as staging:
             train_runs, test_runs = split_runs(settings, terminal)
             check_belong(unit, (*train_runs, *test_runs))
-            if self.shared is None:
-                model, judgement = fit_and_judge(settings, train_runs, test_runs, terminal)
-            else:
+            drawn = None
+            if self.shared is not None:
                 from fogml.fleet.shared import shared_model
 
-                model = shared_model(self.shared, unit.covariates).fit(train_runs)
-                judgement = judge(
-                    model,
-                    train_runs,
-                    test_runs,
-                    averaging_s=settings.averaging,
-                    design_index=settings.design_index,
-                    limits=settings.limits,
-                    any_unit=settings.any_unit,
-                    noise=noise_run(settings, terminal),
-                )
+                drawn = shared_model(self.shared, unit.covariates)
+            model, judgement = fit_and_judge(settings, train_runs, test_runs, terminal, drawn)
             write_results(staging, settings, model, judgement, terminal)
         return {
             **_told(judgement),
@@ -95,7 +83,7 @@ class UnitWork:
         from fogml.cli.compare_job import CompareSettings, compare_and_write
 
         settings = self._for(CompareSettings, unit, folder, runs=list(unit.train), test=list(unit.test))
-        met = compare_and_write(settings, Terminal(quiet=True))
+        met = compare_and_write(settings, Terminal(quiet=True), partial(check_belong, unit))
         models = json.loads((folder / "compare.json").read_text(encoding="utf-8"))["models"]
         worst = {
             name: max(body["test"], key=lambda run: run["after"]["rms"]) for name, body in models.items()
@@ -117,7 +105,7 @@ class UnitWork:
         from fogml.fleet.diagnosis import unit_diagnosis
 
         settings = self._for(DiagnoseSettings, unit, folder, runs=list(unit.train), held_out=list(unit.test))
-        found = diagnose_and_write(settings, Terminal(quiet=True))
+        found = diagnose_and_write(settings, Terminal(quiet=True), partial(check_belong, unit))
         assert isinstance(found, Diagnosis)
         far = [item for item in found.how_far if item.after is not None]
         worst = max(far, key=lambda item: item.after) if far else None
@@ -137,7 +125,8 @@ class UnitWork:
         from fogml.models.names import make_model
 
         terminal = Terminal(quiet=True)
-        own = {"limits": self.settings.get("acceptance_limits")}
+        # Of the fleet's settings these two names mean others: limits of judgements, a model's name.
+        own = {"limits": self.settings.get("acceptance_limits"), "model": None}
         settings = self._for(AcceptanceSettings, unit, folder, runs=list(unit.test), **own)
 
         def model_of() -> DriftModel | None:

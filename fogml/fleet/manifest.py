@@ -95,7 +95,7 @@ def _csv_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
     """Rows as a spreadsheet program saves them, in any language: its encoding and what separates cells."""
     # Rows are told by the numbers that a spreadsheet program shows beside them.
     numbered = list(enumerate(io.StringIO(text_of(path), newline=""), start=1))
-    numbers, lines = zip(*[(i, line) for i, line in numbered if not line.startswith("#")] or [(1, "")])
+    numbers, lines = zip(*[(i, line) for i, line in numbered if line.strip() and line[0] != "#"] or [(1, "")])
     head = lines[0]
     separator = next((mark for mark in ",;\t" if mark in head), ",")
     try:
@@ -130,6 +130,11 @@ def _yaml_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
 def _check_keys(keys: Iterable[str], place: str) -> None:
     keys = list(keys)
     for key in keys:
+        if keys.count(key) > 1:
+            raise InputError(
+                f"{place}: column {quoted(key)} stands {keys.count(key)} times, once was expected; several "
+                "runs go into one cell, with ';' between them"
+            )
         if key not in COLUMNS and not (key.startswith(COVARIATE) and _COVARIATE_NAME.fullmatch(key)):
             raise InputError(
                 f"{place}: unknown column {quoted(key)}; {known_are(key, COLUMNS)}, "

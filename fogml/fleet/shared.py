@@ -176,7 +176,7 @@ class SharedModel(MixedEffectsModel):
         self._member = member
         own = features.box
         levels = [atom.text for atom in features.atoms if atom.operator == "value"]
-        covered = min((_span(own[name]) / _span(self.box[name]) for name in levels), default=1.0)
+        covered = min((_covered(own[name], self.box[name]) for name in levels), default=1.0)
         self.agreement_ = agreement(*member.told(table), prior)
         self._alone = self._why_alone(covered)
         self.from_fleet_ = {}
@@ -279,6 +279,13 @@ def shared_model(
 
 def _span(ends: Sequence[float]) -> float:
     return max(float(ends[1]) - float(ends[0]), 1e-12)
+
+
+def _covered(own: Sequence[float], fleet: Sequence[float]) -> float:
+    """Share of a fleet's range that lies in a unit's own; a single value lies in it or not."""
+    if fleet[0] == fleet[1]:
+        return float(own[0] <= fleet[0] <= own[1])
+    return max(min(own[1], fleet[1]) - max(own[0], fleet[0]), 0.0) / _span(fleet)
 
 
 def _beyond(own: Sequence[float], fleet: Sequence[float]) -> list[tuple[float, float]]:

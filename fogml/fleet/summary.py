@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,7 +14,7 @@ from fogml.fleet.diagnosis import RULES, line_diagnosis
 from fogml.fleet.shares import discoveries
 from fogml.fleet.tasks import DONE
 from fogml.intervals import SIGMA_PER_MEDIAN
-from fogml.numerals import percent, short
+from fogml.numerals import in_order_of_serial, percent, short
 
 FLEET_SCHEMA = "fogml.fleet/1"
 _OUTLYING = 3.5
@@ -86,11 +85,6 @@ def _unit(outcome: Mapping[str, Any]) -> dict[str, Any]:
 def label_of(unit: Mapping[str, Any]) -> str:
     """Serial number and axis."""
     return f"{unit['unit']} {unit['axis']}".strip()
-
-
-def in_order_of_serial(label: str) -> list[tuple[int, int | str]]:
-    """Sort key: numbers in a label by their value."""
-    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.findall(r"\d+|\D+", label)]
 
 
 def _quantiles(values: Sequence[float]) -> dict[str, float] | None:
@@ -178,16 +172,16 @@ def told_of(unit: Mapping[str, Any]) -> str:
 
 def _constants(outcomes: Sequence[Mapping[str, Any]]) -> tuple[list[str], FleetConstants] | None:
     """Labels in order of serial numbers, and the fleet's constants; None where too few units tell them."""
-    held = {
-        label_of(outcome): UnitConstants.from_dict(outcome["found"]["constants"])
+    held = [
+        (label_of(outcome), UnitConstants.from_dict(outcome["found"]["constants"]))
         for outcome in outcomes
         if outcome.get("found", {}).get("constants")
-    }
-    labels = sorted(held, key=in_order_of_serial)
-    if len(labels) < LEAST_UNITS:
+    ]
+    held.sort(key=lambda one: in_order_of_serial(one[0]))
+    if len(held) < LEAST_UNITS:
         return None
     try:
-        return labels, fleet_constants([held[label] for label in labels])
+        return [label for label, _ in held], fleet_constants([constants for _, constants in held])
     except (InputError, np.linalg.LinAlgError):
         return None
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from os.path import relpath
@@ -18,6 +17,7 @@ from fogml.json_files import finite_json, json_object, read_json
 from fogml.lab.acceptance import ACCEPTED, INCOMPLETE, NO_LIMITS, REJECTED
 from fogml.lab.acceptance import SCHEMA as ACCEPTANCE
 from fogml.lab.acceptance_rows import QUANTITIES
+from fogml.numerals import in_order_of_serial
 
 SCHEMA = "fogml.batch/1"
 REPORT = "acceptance.json"
@@ -65,7 +65,7 @@ def batch_json(reports: Sequence[tuple[Path, Mapping[str, Any]]], home: Path | N
         with distribution of sizes, limit and how many are over it, ``units`` with those rejected first.
     """
     units = [_unit(file, report, home) for file, report in reports]
-    units.sort(key=lambda one: (_ORDER[one["verdict"]], by_serial(f"{one['serial_number']} {one['axis']}")))
+    units.sort(key=_place)
     counts = Counter(one["verdict"] for one in units)
     judged = counts[ACCEPTED] + counts[REJECTED]
     low, high = _interval(counts[ACCEPTED], judged) if judged else (None, None)
@@ -91,9 +91,9 @@ def _interval(part: int, whole: int) -> tuple[float, float]:
     return float(found.low), float(found.high)
 
 
-def by_serial(label: str) -> list[tuple[int, int | str]]:
-    """Sort key: numbers in a label by their value."""
-    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.findall(r"\d+|\D+", label)]
+def _place(unit: Mapping[str, Any]) -> tuple[int, Any]:
+    """Sort key: rejected units first, then by serial number and axis."""
+    return _ORDER[unit["verdict"]], in_order_of_serial(f"{unit['serial_number']} {unit['axis']}")
 
 
 def figure_of(row: Mapping[str, Any]) -> float | None:

@@ -9,9 +9,9 @@ from urllib.parse import quote
 
 import plotly.graph_objects as go
 
-from fogml.fleet.summary import in_order_of_serial, label_of, told_of
+from fogml.fleet.summary import label_of, told_of
 from fogml.fleet.tasks import DONE
-from fogml.numerals import MISSING, averages, listed, number, percent, plural
+from fogml.numerals import MISSING, averages, in_order_of_serial, listed, number, percent, plural
 from fogml.report import style
 from fogml.report.figures_fleet import by_unit, constants, distribution
 from fogml.report.page import Drawing, Tile, render

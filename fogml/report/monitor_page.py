@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from fogml.fleet.summary import in_order_of_serial, label_of
-from fogml.numerals import number, percent, plural
+from fogml.fleet.summary import label_of
+from fogml.numerals import in_order_of_serial, number, percent, plural
 from fogml.report.monitor_words import (
     FIGURE_WORDS,
     alarm_words,

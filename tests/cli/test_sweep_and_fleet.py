@@ -148,6 +148,8 @@ def test_networks_of_a_fleet_are_those_of_train(invoke_json, tmp_path):
         (("--device", "cuda:99", "--model", "rbf"), "--device cuda:99: is not there"),
         (("--device", "cpu", "--model", "auto"), "--model rbf"),
         (("--prior", "nothing.json"), "no such file"),
+        (("--prior", "prior.json", "--model", "rbf"), "--model: with --prior the earlier fleet makes"),
+        (("--prior", "prior.json", "--features", "T"), "--features: with --prior the earlier fleet makes"),
         (("--workers", 0), "workers 0"),
         (("--model", "nothing"), "model 'nothing' is not known"),
         (("--form", "T, time"), "known: temperatures"),
@@ -155,6 +157,8 @@ def test_networks_of_a_fleet_are_those_of_train(invoke_json, tmp_path):
 )
 def test_bad_fleets(invoke, tmp_path, monkeypatch, arguments, message):
     monkeypatch.setattr("fogml.fleet.engines._ANSWER_S", 1)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "prior.json").write_text("{}")
     manifest = write_fleet(tmp_path, 1)
     result = invoke("fleet", manifest, "--out", tmp_path / "out", *arguments, status=2)
     assert message in result.stderr.splitlines()[-1]
@@ -203,6 +207,27 @@ def test_a_fleet_done_before_is_done_again_where_a_side_file_has_changed(invoke_
     resumed = invoke_json(*arguments, tmp_path / "out")["units"][0]
     assert resumed == invoke_json(*arguments, tmp_path / "anew")["units"][0]
     assert resumed["after"] != first["after"]
+
+
+def test_a_fleet_done_before_is_done_again_where_its_noise_run_has_changed(invoke_json, tmp_path):
+    manifest = write_fleet(tmp_path, 1)
+    noise = tmp_path / "still.csv"
+    write_run(noise, "FOG-000", 9, slope=0.0, cycles=0.0)
+    arguments = ("fleet", manifest, "--model", "none", "--averaging", 40, "--noise", noise, "--out")
+    first = invoke_json(*arguments, tmp_path / "out")["units"][0]
+    head, *rows = noise.read_text().splitlines()
+    louder = (row.split(",") for row in rows)
+    noise.write_text("\n".join([head, *(",".join([t, str(10 * float(g)), *rest]) for t, g, *rest in louder)]))
+    again = invoke_json(*arguments, tmp_path / "out")["units"][0]
+    assert again["floor"] == pytest.approx(10.0 * first["floor"], rel=1e-6)
+
+
+@pytest.mark.parametrize("job", ["compare", "diagnose"])
+def test_every_job_is_of_the_unit_that_the_manifest_names(invoke_json, tmp_path, job):
+    write_fleet(tmp_path, 2)
+    (tmp_path / "mixed.csv").write_text(f"unit,job,train,test\nFOG-000,{job},1a.csv,1b.csv\n")
+    told = invoke_json("fleet", tmp_path / "mixed.csv", "--out", tmp_path / "out", status=1)["units"][0]
+    assert told["reason"] == "1a.csv: is of unit 'FOG-001', the manifest names 'FOG-000'"
 
 
 def test_a_batch_is_of_the_units_that_are_done(tmp_path):

@@ -83,6 +83,8 @@ def test_a_list_is_no_name(folder):
             HEAD + "# made by hand\n\nF-1,train,a.csv,b.csv,x\n\n,,,,\n,train,a.csv,b.csv,x\n",
             "row 7: column 'unit'",
         ),
+        ("\n" + HEAD + ",train,a.csv,b.csv,x\n", "row 3: column 'unit' is empty"),
+        ("unit,train,train,test\nF-1,a.csv,c.csv,b.csv\n", "column 'train' stands 2 times"),
         (HEAD + "F-1,train,a.csv,,x\n", "column 'test' names no run"),
         (HEAD + "F-1,train,,b.csv,x\n", "column 'train' names no run"),
         (HEAD + "F-1,train,a.csv,b.csv,x,more\n", "more cells than the header"),

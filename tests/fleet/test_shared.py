@@ -265,6 +265,12 @@ def test_too_short_a_run_is_not_carried_beyond_itself(fleet):
     assert high - low < 0.25 * (fleet.box["T"][1] - fleet.box["T"][0])
 
 
+def test_temperatures_beyond_the_fleets_cover_none_of_them(fleet):
+    run = unit_run(301, draw(301))
+    model = shared_model(fleet).fit(run.with_columns(T=run.columns["T"] + 100.0))
+    assert any("the runs cover 0 % of the fleet's temperatures" in note for note in model.card_.notes)
+
+
 def test_a_shared_model_is_saved_and_loaded(fleet, tmp_path):
     model = shared_model(fleet).fit(unit_run(400, draw(400), hours=2.0))
     save_model(model, tmp_path / "model")
