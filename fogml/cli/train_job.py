@@ -60,8 +60,6 @@ def check_settings(settings: TrainSettings | CompareSettings) -> None:
         unfitted_model(settings)
         if settings.train_again and settings.design_index is None:
             raise InputError("--train-again needs a --design-index to reach")
-        if settings.train_again and settings.parameters:
-            raise InputError("--set: --train-again looks for sizes itself; leave one of them out")
 
 
 def split_runs(settings: TrainSettings | CompareSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:

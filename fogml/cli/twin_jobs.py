@@ -118,9 +118,7 @@ def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
     outs = [Path(run.out) for run in settings.runs]
     written = Counter(os.path.abspath(path) for run in settings.runs for path in (run.out, run.truth) if path)
     if twice := [path for path, times in written.items() if times > 1]:
-        raise InputError(
-            f"runs: two are written to {twice[0]}; give each 'out' and 'truth' its own name"
-        )
+        raise InputError(f"runs: two are written to {twice[0]}; give each 'out' and 'truth' its own name")
     kept = settings.storage
     storage = Storage(kept.temperature, kept.humidity, kept.power == "on")
     results = []

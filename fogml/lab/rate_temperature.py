@@ -79,13 +79,13 @@ def temperature_sensitivity(runs: Sequence[Run], least_deg_h: float, most_deg_h:
     most_deg_h
         The greatest rate that the output follows [deg/h].
     """
-    parts = {run.name: _steps(run, least_deg_h, most_deg_h) for run in runs if run.temperature_columns}
-    for place, part in enumerate(parts.values()):
+    parts = [(run.name, _steps(run, least_deg_h, most_deg_h)) for run in runs if run.temperature_columns]
+    for place, (_, part) in enumerate(parts):
         # Rows of other runs are others.
         part[:, 4:] += place * max(map(len, runs))
-    parts = {name: part for name, part in parts.items() if len(part)}
-    parts = {name: part for name, part in parts.items() if _apart(part)} or parts
-    steps = np.concatenate([np.empty((0, 8)), *parts.values()])
+    parts = [(name, part) for name, part in parts if len(part)]
+    parts = [(name, part) for name, part in parts if _apart(part)] or parts
+    steps = np.concatenate([np.empty((0, 8)), *(part for _, part in parts)])
     if not _apart(steps):
         return None
     soaks = _soaks(steps)
@@ -102,7 +102,7 @@ def temperature_sensitivity(runs: Sequence[Run], least_deg_h: float, most_deg_h:
         se, half = (1e6 * part / abs(float(solved[0])) for part in (found.se, found.half_width))
         ends = (slope - half, slope + half)
     curve = 1e6 * float(solved[2] / solved[0]) if columns == 3 else None
-    return Sensitivity(slope, se, ends, curve, x, y, tuple(parts))
+    return Sensitivity(slope, se, ends, curve, x, y, tuple(name for name, _ in parts))
 
 
 def _apart(steps: FloatArray) -> bool:

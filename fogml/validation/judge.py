@@ -287,7 +287,7 @@ def _notes(train: Sequence[Run], test: Sequence[Run]) -> tuple[str, ...]:
     unknown = sorted({run.name for run in runs if not run.earth_known})
     if not unknown:
         return ()
-    if len(unknown) < len({run.name for run in runs}):
+    if any(run.earth_known for run in runs):
         return (
             f"Earth rate is known for some runs and not for {', '.join(unknown)}: biases are given relative "
             "to the training runs' mean and hold the difference; state latitude and input_axis in the "

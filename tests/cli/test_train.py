@@ -154,8 +154,6 @@ def test_train_again_searches_on_training_folds(invoke_json, invoke, run_files, 
     report = invoke_json(*arguments, "--train-again", "--design-index", "0.2")
     assert any("folds of the training runs" in note for note in report["notes"])
     assert report["design_index"]["met"] is True
-    result = invoke(*arguments, "--train-again", "--design-index", 1, "--set", "ridge=1e-6", status=2)
-    assert "--set: --train-again looks for sizes itself" in result.stderr
     result = invoke(*arguments, "--train-again", status=2)
     assert "--design-index" in result.stderr
 

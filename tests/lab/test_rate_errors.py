@@ -110,6 +110,18 @@ def test_soaks_of_three_temperatures_have_an_interval_of_few_degrees_of_freedom(
     assert np.mean(held) >= 0.8
 
 
+def test_runs_of_one_name_each_tell_of_the_scale_factor_over_temperature() -> None:
+    rate = np.tile(np.repeat([0.0, 10.0, -10.0, 0.0], 60), 2)
+    runs = []
+    for warmth in (-40.0, 60.0):
+        columns = {"time": np.arange(len(rate)) * 1.0, "rate": rate, "T": np.full(len(rate), warmth)}
+        columns["gyro"] = 3600.0 * rate * (1.0 + 2e-6 * (warmth - 10.0))
+        runs.append(Run("ladder.csv", columns, Facts()))
+    sensed = rate_json(runs, source="table")["temperature_sensitivity"]
+    assert sensed["ppm_per_degC"] == pytest.approx(2.0, rel=1e-6)
+    assert sensed["temperature"] == pytest.approx([-40.0, 60.0])
+
+
 @pytest.mark.parametrize("one_way", [[0, 1, 2], [1]])
 def test_soaks_that_turned_one_way_are_no_half_of_a_scale_factor(one_way: list[int]) -> None:
     rng = np.random.default_rng(4)
