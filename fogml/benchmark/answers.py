@@ -94,7 +94,7 @@ def read_drift(folder: Path, samples: int) -> DriftAnswer:
         raise InputError(
             f"{path}: is larger than {samples} rows can be; expected one row for each of held-out-1.csv"
         )
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     cells = tuple(cell.strip() for cell in lines[0].split(",")) if lines else ()
     if cells not in (HEADER, HEADER[:1]):
         expected = f"'{','.join(HEADER)}', the second column if there are intervals"

@@ -124,7 +124,7 @@ def _figures(marks: Sequence[DriftMark]) -> dict[str, Any]:
         "ratio": asdict(geometric_mean([m.ratio for m in marks])),
         "worst": max(m.ratio for m in marks),
         "harmful": asdict(proportion([m.harmful for m in marks])),
-        "coverage": asdict(mean(covered)),
+        "coverage": asdict(within_one(mean(covered))),
         "width": asdict(geometric_mean([m.width / m.nothing for m in marks if m.width])),
         "bytes": float(np.median(sizes)) if sizes else None,
         "failed": sum(bool(m.failure) for m in marks),

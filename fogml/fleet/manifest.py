@@ -26,6 +26,8 @@ JOBS = ("train", "compare", "diagnose", "acceptance")
 SHIPPED = "shipped:"
 _COVARIATE_NAME = re.compile(COVARIATE + r"[A-Za-z0-9_ -]+")
 _UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
+_FILE = re.compile(r"\.(json|html|xlsx|yaml)$", re.IGNORECASE)
+# How files end that stand beside the units' folders.
 
 
 @dataclass(frozen=True)
@@ -223,6 +225,7 @@ def folder_names(units: Sequence[str]) -> list[str]:
     taken: set[str] = set()
     for unit in units:
         wanted = (_UNSAFE.sub("_", unit).strip(".") or "unit")[:_LONGEST_FOLDER]
+        wanted = _FILE.sub(r"_\1", wanted)
         folder, number = wanted, 1
         # Names that differ only in case are one folder on some systems.
         while folder.lower() in taken:

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from fogml.benchmark.answers import answer_by, entry_name, read_drift, write_drift
 from fogml.benchmark.make import DriftCase, make_round, write_round
 from fogml.benchmark.rounds import RoundDesign, TrackFolder
-from fogml.benchmark.score import _told_unknown, geometric_mean, score_round
+from fogml.benchmark.score import DriftMark, _told_unknown, drift_figures, geometric_mean, score_round
 from fogml.blind.folders import case_files
 from fogml.blind.scoring.answers import NAMED
 from fogml.cli.main import app
@@ -222,3 +222,17 @@ def test_a_method_that_fails_says_why_at_once(made: Path, tmp_path: Path) -> Non
     ran = CliRunner().invoke(app, [*command, "--workers", "1"])
     assert ran.exit_code == 0, ran.output
     assert "1 failed" in ran.output and "case 0001: ValueError: no such bend" in ran.output
+
+
+def test_an_interval_of_a_share_ends_at_one():
+    shares = np.array([1.0, 0.9, 1.0])
+    marks = [DriftMark(str(i), "own", 1.0, 0.5, 0.1, share, 0.2, None) for i, share in enumerate(shares)]
+    told = drift_figures(marks)["all"]["coverage"]
+    half = 1.959964 * shares.std(ddof=1) / np.sqrt(3)
+    assert told["value"] == pytest.approx(shares.mean())
+    assert told["low"] == pytest.approx(shares.mean() - half) and told["high"] == 1.0 < shares.mean() + half
+
+
+def test_an_answer_that_a_spreadsheet_saved_is_read(tmp_path):
+    (tmp_path / "drift.csv").write_text("drift [deg/h]\n0.5\n0.25\n", encoding="utf-8-sig")
+    assert read_drift(tmp_path, 2).drift.tolist() == [0.5, 0.25]

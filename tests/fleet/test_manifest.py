@@ -60,12 +60,13 @@ def test_a_folder_is_no_manifest(folder):
 
 
 def test_folders_are_safe_and_unlike_each_other(folder):
-    given = ("a/b", "a:b", "..", "A_B", "../../etc", "x" * 300, "x" * 301)
+    given = ("a/b", "a:b", "..", "A_B", "../../etc", "x" * 300, "x" * 301, "fleet.json", "Batch.XLSX")
     lines = "".join(f'"{name}",train,a.csv,b.csv,\n' for name in given)
     units = read_manifest(manifest(folder, HEAD + lines))
     names = [unit.folder.lower() for unit in units]
     assert len(set(names)) == len(names)
     assert not any("/" in name or name.startswith(".") or len(name) > 110 for name in names)
+    assert not {"fleet.json", "batch.xlsx"} & set(names)  # files of the fleet's own
 
 
 def test_a_list_is_no_name(folder):
