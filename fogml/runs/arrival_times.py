@@ -150,8 +150,13 @@ def pauses_are_real(time: FloatArray, ends: IndexArray, columns: Mapping[str, Fl
     return best > DECISIVE_SIGMA
 
 
-def _even_clock(time: FloatArray, anchors: IndexArray, least_gap_s: float = 0.0) -> EvenClock | None:
-    """Even sampling through the times of samples that tell them; None where they don't fit it."""
+def _even_clock(
+    time: FloatArray, anchors: IndexArray, starts: IndexArray, least_gap_s: float = 0.0
+) -> EvenClock | None:
+    """Even sampling through the times of samples that tell them; None where they don't fit it.
+
+    Each of these `anchors` is of a burst, or of the samples of one stamp, that begins at its row of `starts`.
+    """
     told = time[anchors]
     periods, sizes = np.diff(told), np.diff(anchors)
     if len(periods) < 2:
@@ -161,7 +166,7 @@ def _even_clock(time: FloatArray, anchors: IndexArray, least_gap_s: float = 0.0)
     limit = max(_GAP_PERIODS * period, 3.0 * interval, least_gap_s)
     breaks = np.flatnonzero(periods - sizes * interval > limit) + 1
     edges = [0, *breaks.tolist(), len(anchors)]
-    first = [0, *(anchors[breaks - 1] + 1).tolist(), len(time)]
+    first = [0, *starts[breaks].tolist(), len(time)]
     rebuilt, worst, slopes = np.empty(len(time)), 0.0, []
     for part in range(len(edges) - 1):
         within = slice(edges[part], edges[part + 1])
@@ -220,7 +225,8 @@ def sampling_times(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, Findi
     ends = burst_ends(time)
     if ends is None:
         return time, None
-    clock = None if pauses_are_real(time, ends, columns) else _even_clock(time, ends)
+    starts = np.concatenate([[0], ends + 1])
+    clock = None if pauses_are_real(time, ends, columns) else _even_clock(time, ends, starts)
     if clock is None:
         return time, None
     size = float(np.median(np.diff(ends)))
@@ -239,7 +245,7 @@ def spread_stamps(time: FloatArray) -> tuple[FloatArray, str]:
     first = np.concatenate([[0], np.flatnonzero(time[1:] != time[:-1]) + 1])
     steps = np.diff(time[first])
     step = float(steps.min()) if len(steps) else 1.0
-    clock = _even_clock(time, first, least_gap_s=2.0 * step) if len(first) >= LEAST_BURSTS else None
+    clock = _even_clock(time, first, first, 2.0 * step) if len(first) >= LEAST_BURSTS else None
     if clock is not None and clock.error_s <= 1.5 * step:
         return clock.time, clock.words()
     sizes = np.diff(np.append(first, len(time)))

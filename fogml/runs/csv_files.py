@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator
+from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,16 +104,18 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
         raise cut_error(path, cut)
     start = 0
     clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
+    told = copy(clock)
     try:
         for table in _regrouped(_batches(dialect), rows):
             raw = _raw(path, dialect, table, start, clock)
             start += table.num_rows
+            told = copy(clock)
             yield raw if start > table.num_rows else raw.noting(notes)
     except OSError as error:
         raise _unreadable(path, error) from None
     except arrow.ArrowException:
         lines = LineReader(path, dialect)
-        for raw in lines.tables(rows, skip=start):
+        for raw in lines.tables(rows, skip=start, clock=told):
             yield raw.noting([*lines.findings(), *(notes if start == 0 else [])])
             start += len(raw)
     if start == 0:

@@ -66,12 +66,15 @@ class LineReader:
     first_fault: tuple[int, str] | None = None
     text_lines: dict[int, int] = field(default_factory=dict)
 
-    def tables(self, rows: int = _CHUNK_ROWS, skip: int = 0) -> Iterator[RawTable]:
-        """Tables of at most `rows` rows, after so many data rows that are skipped."""
+    def tables(
+        self, rows: int = _CHUNK_ROWS, skip: int = 0, clock: StampClock | None = None
+    ) -> Iterator[RawTable]:
+        """Tables of at most `rows` rows, after so many data rows that are skipped, which `clock` has seen."""
         values: list[list[float]] = []
         stamps: list[list[str]] = []
         lines: list[int] = []
-        clock = StampClock(self.dialect.stamps, self.path.name) if self.dialect.stamps else None
+        if clock is None and self.dialect.stamps:
+            clock = StampClock(self.dialect.stamps, self.path.name)
         for row, (line, fields) in enumerate(self._records()):
             if row < skip:
                 continue

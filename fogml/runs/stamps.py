@@ -161,10 +161,11 @@ class StampClock:
                 "recording goes on over midnight; write them as year-month-day"
             )
         if self.round_ns and len(total):
-            total = np.where(wrong, self.last_ns % self.round_ns, total)
-            steps = np.diff(np.concatenate([[self.last_ns % self.round_ns], total]))
-            rounds = np.cumsum((steps < -self.round_ns // 2).astype(np.int64))
-            self.last_ns = int(total[-1])
+            # In the place of what is no stamp the one before it.
+            told = np.concatenate([[self.last_ns % self.round_ns], total])
+            told = told[np.maximum.accumulate(np.append(0, np.where(wrong, 0, np.arange(1, len(told)))))]
+            rounds = np.cumsum((np.diff(told) < -self.round_ns // 2).astype(np.int64))
+            self.last_ns = int(told[-1])
             total = total + (self.rounds + rounds) * self.round_ns
             self.rounds += int(rounds[-1])
         return np.where(wrong, np.nan, (total - self.stamps.first_ns) / _NS)
@@ -202,8 +203,8 @@ def stamps_of(columns: Sequence[tuple[int, Sequence[str]]]) -> Stamps | None:
         if wrong[0]:
             return None
         first += int(found[0])
-    zoned = any(re.search(r"(Z|UTC|[+-]\d{2}:?\d{2})\s*\Z", texts[0]) for _, texts in columns)
-    return Stamps(known, first, zoned and not all(form.kind == "date" for _, form in known))
+    shown = [re.match(_FORMS[form.kind], texts[0]) for (_, form), (_, texts) in zip(known, columns)]
+    return Stamps(known, first, any(match is not None and match.groupdict().get("z") for match in shown))
 
 
 def _whole(texts: Any) -> IntArray:
