@@ -50,6 +50,8 @@ def read_yaml(path: Path, as_text: Collection[str] = ()) -> Any:
     try:
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise _too_long(path.name)
         text = content.decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}){with_slashes(path)}") from None
@@ -77,7 +79,7 @@ def parse_yaml(text: str, source: str, as_text: Collection[str] = ()) -> Any:
         Nothing but dict, list, str, bool, int, finite float and None.
     """
     if len(text) > MOST_BYTES:
-        raise InputError(f"{source}: longer than {MOST_BYTES >> 20} MB; that is no text of settings")
+        raise _too_long(source)
     try:
         return _Builder(text, source, frozenset(as_text)).document()
     except yaml.reader.ReaderError as error:
@@ -91,6 +93,10 @@ def parse_yaml(text: str, source: str, as_text: Collection[str] = ()) -> Any:
         raise InputError(f"{source}{place}: not readable as YAML ({problem}); correct or remove it") from None
     except (yaml.YAMLError, ValueError) as error:
         raise InputError(f"{source}: not readable as YAML ({quoted(str(error))})") from None
+
+
+def _too_long(source: str) -> InputError:
+    return InputError(f"{source}: longer than {MOST_BYTES >> 20} MB; that is no text of settings")
 
 
 def yaml_text(values: Any, width: int = 110) -> str:

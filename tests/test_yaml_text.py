@@ -16,6 +16,15 @@ from fogml.yaml_text import DEEPEST, MOST_BYTES, parse_yaml, read_yaml, yaml_tex
 ROOT = Path(__file__).parents[1]
 
 
+def test_a_file_too_long_in_bytes_is_not_read_in_part(tmp_path):
+    path = tmp_path / "a.yaml"
+    # A cut after whole characters, and at a line's end, would read as a shorter file.
+    line = "- 陀螺陀螺陀\n".encode()
+    path.write_bytes(line * (MOST_BYTES // len(line)) + b"\n" * (MOST_BYTES % len(line) + 1) + line)
+    with pytest.raises(InputError, match=r"a\.yaml: longer than 4 MB"):
+        read_yaml(path)
+
+
 @pytest.mark.parametrize(("text", "line"), [("a: 1\na: 2\n", 2), ("b: 1\na:\n  c: 1\n  d: 2\n  c: 3\n", 5)])
 def test_a_repeated_key_is_told_with_its_line(tmp_path, text, line):
     path = tmp_path / "a.yaml"

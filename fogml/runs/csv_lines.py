@@ -217,7 +217,7 @@ def without_footer(dialect: CsvDialect) -> tuple[CsvDialect, list[Finding]]:
 
     Such a line has neither a time nor a gyro's number in their places, or words in that of the time.
     """
-    text = dialect.source.tail(_TAIL_BYTES).decode(dialect.encoding, errors="replace")
+    text = dialect.source.tail(_TAIL_BYTES).decode(dialect.encoding, errors="surrogateescape")
     lines = _LINE.findall(text)[1:]  # the first of them may be a part of one
     places = [i for i in dialect.known if dialect.name(i) == "time" or dialect.name(i).startswith("gyro")]
     forms = dict(dialect.stamps.columns) if dialect.stamps else {}
@@ -276,8 +276,12 @@ def cut_line(source: CsvSource, separator: str | None, decimal: str) -> str | No
         return None
     # The first line of the tail may be a part of one.
     lines = [line for line in re.split(r"[\r\n]+", tail.decode("latin-1"))[1:] if line.strip()]
+    widths = {len(line.split() if separator is None else fields_of(line, separator)) for line in lines[-2:]}
     fields = [line.rsplit(separator, 1)[-1].strip(' "') for line in lines]
-    if len(fields) <= _LEAST_LINES or any(number(field, decimal) is None for field in fields):
+    # A row that ends before its last field is one cut short, whatever it ends with.
+    if len(fields) <= _LEAST_LINES or len(widths) > 1:
+        return None
+    if any(number(field, decimal) is None for field in fields):
         return None
     sizes = [_digits(field, decimal) for field in fields]
     (whole, decimals), before = sizes[-1], sizes[:-1]

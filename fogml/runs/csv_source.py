@@ -98,7 +98,7 @@ class CsvSource:
 
     def without(self, text: str, encoding: str) -> CsvSource:
         """The source without a text at its end."""
-        return replace(self, end=self.stop - len(text.encode(self.wide or encoding, errors="replace")))
+        return replace(self, end=self.stop - len(text.encode(self.wide or encoding, "surrogateescape")))
 
 
 def csv_source(path: Path, head: bytes) -> CsvSource:

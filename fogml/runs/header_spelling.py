@@ -53,6 +53,7 @@ _OF_AN_AXIS = re.compile(r"(?:gyro?|gyroscope|omega|angular(?:rate|velocity)|[gw
 _FORM_OF_TIMES = re.compile(
     r"(?=.*[:y])(?:[ymdhs]{1,4}|f{1,9})(?:[-/.:, t]+(?:[ymdhs]{1,4}|f{1,9}))+\Z", re.IGNORECASE
 )
+_BLANKS = re.compile(r"\s{2,}")
 _NUMBER = re.compile(r"[-+\d.,:' ]+\Z")
 _COMMENT = re.compile(r"\s*(#|%|//)+\s*")
 _FORMS = (
@@ -146,6 +147,7 @@ def _plain(name: str) -> str:
 
 def _parts(cell: str) -> tuple[str, str | None]:
     """Name and unit of a cell; a name that is spelled as one of the run format's is brought to that."""
+    cell = _BLANKS.sub(" ", cell)
     name, unit = parse_header(cell)
     if column_spec(name) is not None:
         return name, unit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -282,6 +283,24 @@ def test_faults_are_named_with_their_place(tmp_path, text, told):
     path.write_text(text)
     with pytest.raises(InputError, match=told):
         read_run(path)
+
+
+@pytest.mark.parametrize("sign", [b"\xb0", b"\xb0\xe4\xff"])
+def test_a_footer_in_another_encoding_than_the_head_takes_no_digit_along(tmp_path, sign):
+    """Bytes that are no text of the head's encoding stay as many as they are."""
+    rows = "".join(f"{i},{2500 + i % 7},{i % 9 + 290}\n" for i in range(9000)).encode()
+    path = tmp_path / "run.csv"
+    path.write_bytes(b"time [s],gyro [deg/h],T [K]\n" + rows + b"Mean: 25 " + sign + b"C\n")
+    run = read_run(path)
+    np.testing.assert_allclose(run.columns["T"], np.arange(9000) % 9 + 290 - 273.15, atol=1e-9)
+    assert "footer" in [finding.code for finding in run.findings]
+
+
+def test_a_header_of_very_many_blanks_is_read_at_once():
+    started = perf_counter()
+    cells = canonical_cells(["time" + " " * 60_000 + "[s]", "a" + " " * 60_000 + "b c;"])
+    assert perf_counter() - started < 1.0  # with a search from each blank it took minutes
+    assert cells == ("time [s]", "a b c;")
 
 
 def test_a_row_cut_short_is_no_footer(tmp_path):

@@ -202,6 +202,16 @@ def test_rows_that_cannot_be_read(tmp_path, spoiled):
             read(path)
 
 
+def test_a_last_row_cut_short_takes_no_other_along(tmp_path):
+    lines = [f"{i},{7.611 + i % 9},{25.1 + i % 7:.2f},26.22" for i in range(60)]
+    path = tmp_path / "run.csv"
+    path.write_text("time [s],gyro [deg/h],T [degC],T_case [degC]\n" + "\n".join([*lines, "60,7.6"]))
+    run = read_run(path, repair=True)
+    assert run.time.tolist() == list(range(60))
+    (told,) = [finding.message for finding in run.findings if finding.code == "repaired_rows"]
+    assert "line 62: 2 fields" in told
+
+
 def test_nothing_left_to_repair(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("time [s],gyro [deg/h]\na,b\nc,d\n")
