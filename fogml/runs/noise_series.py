@@ -78,11 +78,21 @@ def _whole(values: FloatArray, changes: IndexArray, lengths: IndexArray, samples
     """New values every so many samples, those that happen to equal the one before included."""
     between = (
         [np.arange(a, b - samples // 2, samples) for a, b in zip(changes[:-1].tolist(), changes[1:].tolist())]
-        if int(lengths.max()) > samples
+        if int(lengths.max(initial=0)) > samples
         else [changes[:-1]]
     )
     last = np.arange(int(changes[-1]), len(values) - samples + 1, samples)
     return ValueHold(float(samples), np.concatenate((*between, last)).astype(np.intp))
+
+
+def _new_rows(values: FloatArray, samples: float) -> IndexArray:
+    """The first sample of each value of a stretch, however short, of a series whose hold is known."""
+    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
+    if samples != round(samples):
+        return changes
+    if not len(changes):
+        return np.arange(0, len(values) - round(samples) + 1, round(samples))
+    return _whole(values, changes, np.diff(changes), round(samples)).rows
 
 
 Follows = Callable[[FloatArray], FloatArray]
@@ -127,7 +137,8 @@ def series_of(run: Run) -> NoiseSeries:
         return NoiseSeries(
             run, sample_s, segments, 1.0, [error[s] for s in segments], [run.time[s] for s in segments]
         )
-    rows = [s.start + hold_of(error[s]).rows for s in segments]
+    # Of the longest stretch: others may be too short to tell it.
+    rows = [s.start + _new_rows(error[s], hold) for s in segments]
     return NoiseSeries(run, sample_s, segments, hold, [error[r] for r in rows], [run.time[r] for r in rows])
 
 

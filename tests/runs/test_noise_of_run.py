@@ -192,6 +192,18 @@ def test_each_value_four_times_and_a_filtered_output():
     json.dumps(filtered, allow_nan=False)
 
 
+def test_a_hold_counts_in_stretches_too_short_to_tell_it():
+    """White noise of 1 deg/h in values 0.5 s apart, each logged five times, mostly in stretches of 24 values."""
+    rng = np.random.default_rng(1)
+    counts = [400, *[24] * 40]
+    pauses = np.repeat(rng.uniform(1.0, 6.0, len(counts)).cumsum(), 5 * np.array(counts))
+    time = 0.1 * np.arange(5 * sum(counts)) + pauses
+    report = noise_report(Run.from_columns(time=time, gyro=np.repeat(rng.normal(size=sum(counts)), 5)))
+    low, high = report["terms"]["N"]["ci"]
+    assert report["hold"]["samples"] == 5.0 and report["stretches"] == len(counts)
+    assert low < np.sqrt(0.5 / 3600.0) < high < 1.2 * low
+
+
 def test_replicates_share_their_terms_or_are_told_apart():
     one, other = still_run(1), still_run(2)
     shared = noise_report([one, other])
