@@ -193,7 +193,7 @@ def test_each_value_four_times_and_a_filtered_output():
 
 
 def test_a_hold_counts_in_stretches_too_short_to_tell_it():
-    """White noise of 1 deg/h in values 0.5 s apart, each logged five times, mostly in stretches of 24 values."""
+    """White noise of 1 deg/h, values 0.5 s apart that are logged five times, mostly in stretches of 24."""
     rng = np.random.default_rng(1)
     counts = [400, *[24] * 40]
     pauses = np.repeat(rng.uniform(1.0, 6.0, len(counts)).cumsum(), 5 * np.array(counts))

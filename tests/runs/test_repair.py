@@ -129,6 +129,19 @@ def test_a_restarted_clock_makes_legs(tmp_path, second):
     assert counts(first) == {"repaired_restart": 1}
 
 
+def test_legs_of_coarse_counts_keep_what_they_share_by_chance(tmp_path):
+    """A third of the second leg shows the time, the count and the temperature of a row of the first."""
+    counts = np.random.default_rng(1).normal(5.0, 0.7, 2000).round()
+    columns = {
+        "time [s]": np.tile(np.arange(1000.0), 2),
+        "gyro [count]": counts,
+        "T [degC]": np.full(2000, 25.0),
+    }
+    assert 0.2 < np.mean(counts[:1000] == counts[1000:]) < 0.5
+    first, second = read_runs(write_table(tmp_path / "run.csv", columns), repair=True)
+    np.testing.assert_array_equal(np.concatenate([first.gyro, second.gyro]), counts)
+
+
 def test_rows_that_repeat_a_time_within_a_leg_are_not_out_of_place(tmp_path):
     leg = 0.1 * np.arange(600)
     again = np.where((leg > 10.05) & (leg < 10.35), leg[100], leg)
