@@ -37,7 +37,7 @@ class Parquet:
         self.told = {
             "arrays": [array.told for array in self.arrays],
             "facts": {key: metadata[key] for key in keys if key in metadata},
-            "origin_s": next((array.first_ns / 1e9 for array in self.arrays if array.is_stamp), None),
+            "origins_s": [array.first_ns / 1e9 if array.is_stamp else None for array in self.arrays],
         }
 
     def close(self) -> None:

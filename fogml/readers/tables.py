@@ -31,6 +31,7 @@ class Npz(Container):
 
     def __init__(self, path: str, keys: list[str]) -> None:
         super().__init__()
+        self.first: np.datetime64 | None = None
         with zipfile.ZipFile(path) as archive:
             for member in archive.namelist():
                 with archive.open(member) as file:
@@ -53,9 +54,10 @@ class Npz(Container):
             self.add_rows("", name, None, self.rows(file, kind, shape[0]))
         elif kind.kind == "M" and len(shape) == 1 and shape[0]:
             rows = self.rows(file, kind, shape[0])
-            first = rows.read(None, 0, 1)[0]
-            self.origin_s = float(first.astype("datetime64[ns]").astype(np.int64) / 1e9)
-            self.add_rows("", name, "s", rows, None, partial(_seconds_since, first))
+            if self.first is None:
+                self.first = rows.read(None, 0, 1)[0]
+                self.origin_s = _seconds(self.first)
+            self.add_rows("", name, "s", rows, None, partial(_seconds_since, self.first))
         elif (
             kind.kind in "fiub"
             and len(shape) == 2
@@ -197,39 +199,42 @@ class Tdms(Container):
 
         super().__init__()
         self.file = TdmsFile.open(path)
-        starts = [
-            start
-            for group in self.file.groups()
-            for channel in group.channels()
-            if (start := _seconds(channel.properties.get("wf_start_time"))) is not None
-        ]
-        self.origin_s = min(starts, default=None)
-        for group in self.file.groups():
-            for channel in group.channels():
-                self.channel(group.name, channel)
+        channels = [(group.name, channel) for group in self.file.groups() for channel in group.channels()]
+        starts = [start for _, channel in channels if (start := _begin_s(channel)) is not None]
+        # Stamps of before 1970 are none that a clock gave.
+        self.origin_s = min([start for start in starts if start > 0.0] or starts, default=None)
+        self.clocks: dict[str, tuple[float, float]] = {}
+        for group, channel in channels:
+            self.channel(group, channel)
 
     def channel(self, group: str, channel: Any) -> None:
-        """A channel, and its clock unless the group has one of that length."""
+        """A channel, and its clock unless the group has that; one of another clock is a group of its own."""
         kind = getattr(channel.dtype, "kind", "O")
         count = len(channel)
+        start = _begin_s(channel)
+        begin = 0.0 if start is None or self.origin_s is None else start - self.origin_s
         if kind == "M" and count:
             first = channel[0]
             self.add(
                 group,
                 channel.name,
                 "s",
-                Column(count, lambda a, b: (channel[a:b] - first) / np.timedelta64(1, "s")),
+                Column(count, lambda a, b: begin + (channel[a:b] - first) / np.timedelta64(1, "s")),
             )
         if kind not in "fiu" or not count:
             return
         increment = channel.properties.get("wf_increment")
         if increment:
-            start = _seconds(channel.properties.get("wf_start_time"))
-            begin = float(channel.properties.get("wf_start_offset", 0.0))
-            begin += 0.0 if start is None or self.origin_s is None else start - self.origin_s
-            clocks = [d for d in self.described if (d["group"], d["name"]) == (group, "time")]
-            if not clocks:
-                step = float(increment)
+            step = float(increment)
+            begin += float(channel.properties.get("wf_start_offset", 0.0))
+            clock = next((d for d in self.described if (d["group"], d["name"]) == (group, "time")), None)
+            # A recorded clock is of all channels that are as long.
+            held = self.clocks.get(group, (begin, step))
+            apart = abs(held[0] - begin) > 0.5 * step or abs(held[1] / step - 1.0) > 1e-6
+            if clock is not None and (apart or clock["shape"] != [count]):
+                group, clock = f"{group}/{channel.name}", None
+            if clock is None:
+                self.clocks[group] = begin, step
                 self.add(group, "time", "s", Column(count, lambda a, b: begin + step * np.arange(a, b)))
         unit = next((channel.properties[p] for p in _UNIT_PROPERTIES if p in channel.properties), None)
         self.add(group, channel.name, unit, Column(count, lambda a, b: channel[a:b]))
@@ -238,6 +243,13 @@ class Tdms(Container):
         """Let go of the file."""
         super().close()
         self.file.close()
+
+
+def _begin_s(channel: Any) -> float | None:
+    """Seconds from 1970 to a waveform's beginning, or to the first of a channel of stamps; None of others."""
+    if getattr(channel.dtype, "kind", "O") == "M" and len(channel):
+        return _seconds(channel[0])
+    return _seconds(channel.properties.get("wf_start_time"))
 
 
 def _seconds(moment: Any) -> float | None:

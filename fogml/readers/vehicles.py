@@ -201,11 +201,12 @@ class MiniSeed(Container):
         super().__init__()
         self.file = open(path, "rb")  # noqa: SIM115  closed by `close`
         traces = MS3TraceList.from_file(path, unpack_data=False, record_list=True)
-        starts = [segment.starttime for trace in traces for segment in trace]
-        first = min(starts, default=0)
+        # Messages of the logger have no rate.
+        sampled = [[segment for segment in trace if segment.samprate > 0.0] for trace in traces]
+        first = min((segment.starttime for segments in sampled for segment in segments), default=0)
         self.origin_s = first / 1e9
-        for trace in traces:
-            parts = [Segment.of(segment, first) for segment in trace]
+        for trace, segments in zip(traces, sampled, strict=True):
+            parts = [Segment.of(segment, first) for segment in segments]
             parts = [part for part in parts if part.ends[-1] and part.is_of_numbers(self.file)]
             if not parts:
                 continue

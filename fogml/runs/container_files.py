@@ -139,7 +139,8 @@ def container_blocks(
             for cell, array in group.columns
             if _is_joined(cell, main) and (columns is None or parse_header(cell)[0] in columns)
         ]
-        findings += [*left_out, *_joined_findings(joined), *_fields_left_out(stored)]
+        joined, others_of = _one_of_each(joined)
+        findings += [*left_out, *_joined_findings(joined), *others_of, *_fields_left_out(stored)]
         started = moment(stored.told.get("origin_s"))
         beside = [Beside(cell, group.column("time"), array) for cell, group, array in joined]
         for table in stored_blocks(stored, vectors, tuple(findings), None, rows, columns):
@@ -150,6 +151,22 @@ def _is_joined(cell: str, main: Group) -> bool:
     name = parse_header(cell)[0]
     is_known = column_spec(name) is not None or re.fullmatch("gyro_[xyz]", name) is not None
     return is_known and name not in ("time", "gyro") and name not in main.names
+
+
+def _one_of_each(
+    joined: Sequence[tuple[str, Group, StoredArray]],
+) -> tuple[list[tuple[str, Group, StoredArray]], list[Finding]]:
+    """The first of the columns of a name, and a finding where other groups hold one too."""
+    of_name: dict[str, list[tuple[str, Group, StoredArray]]] = {}
+    for one in joined:
+        of_name.setdefault(parse_header(one[0])[0], []).append(one)
+    findings = []
+    for name, (first, *others) in of_name.items():
+        if others:
+            groups = listed([quoted(group.name) for _, group, _ in others])
+            message = f"'{name}' of {quoted(first[1].name)} is read; an import profile reads that of {groups}"
+            findings.append(Finding("other_columns", message, column=name, count=len(others)))
+    return [held[0] for held in of_name.values()], findings
 
 
 def _joined_findings(joined: Sequence[tuple[str, Group, StoredArray]]) -> Iterator[Finding]:

@@ -46,7 +46,8 @@ def parquet_blocks(
         facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the metadata")
         cells = canonical_cells([cell for cell, _ in vectors])
         vectors = [(cell, array) for cell, (_, array) in zip(cells, vectors, strict=True)]
-        started = moment(stored.told.get("origin_s"))
+        clock = next((array for cell, array in vectors if parse_header(cell)[0] == "time"), None)
+        started = None if clock is None else moment(stored.told["origins_s"][clock.index])
         for table in stored_blocks(stored, vectors, tuple(findings), facts, rows, columns):
             yield replace(table, started=started)
 

@@ -330,6 +330,78 @@ def test_units_stated_as_the_message_says_are_read(tmp_path):
     np.testing.assert_array_equal(read_run(tmp_path / "log.h5").gyro, GYRO)
 
 
+def test_stamps_of_several_groups_count_from_one_moment(tmp_path):
+    """A thermometer's log in TDMS that began 5 s before the gyro's; temperatures are those of the moment."""
+    nptdms = pytest.importorskip("nptdms")
+    begin = np.datetime64(files.START_S, "s")
+    gyro_s, warm_s = 5.0 + TIME, np.arange(0.0, 40.0, 2.0)
+
+    def stamps(seconds):
+        return begin + (1000 * seconds).astype("timedelta64[ms]")
+
+    channels = {"g": {"time": stamps(gyro_s), "gyro [deg/h]": GYRO}}
+    channels["t"] = {"time": stamps(warm_s), "T [degC]": 20.0 + warm_s / 8.0}
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        for group, columns in channels.items():
+            writer.write_segment([nptdms.ChannelObject(group, *column) for column in columns.items()])
+    run = read_run(tmp_path / "log.tdms")
+    np.testing.assert_allclose(run.columns["T"], 20.0 + gyro_s / 8.0, atol=1e-6)
+    assert run.facts.started == STARTED
+    np.testing.assert_allclose(run.time, gyro_s, atol=1e-6)
+
+
+def test_waveforms_of_two_rates_in_one_group_of_tdms(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    told = {"gyro": (GYRO, 0.25, "deg/h"), "T_in": (WARM[::10], 2.5, "°C"), "supply": (WARM, 0.25, "V")}
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        properties = {
+            name: {"wf_increment": step, "unit_string": unit} for name, (_, step, unit) in told.items()
+        }
+        writer.write_segment([nptdms.ChannelObject("g", n, told[n][0], properties[n]) for n in told])
+    run = read_run(tmp_path / "log.tdms")
+    np.testing.assert_allclose(run.columns["T_in"], SLOW, atol=1e-9)
+    np.testing.assert_array_equal(run.columns["supply"], WARM)
+
+
+def test_a_column_that_two_groups_hold_is_of_the_first_and_the_other_is_told(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    groups = {"g": {"gyro [deg/h]": GYRO}, "inner": {"T [degC]": WARM}, "rack": {"T [degC]": WARM + 30.0}}
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        for group, columns in groups.items():
+            columns = {"time [s]": TIME, **columns}
+            writer.write_segment([nptdms.ChannelObject(group, *column) for column in columns.items()])
+    run = read_run(tmp_path / "log.tdms")
+    np.testing.assert_array_equal(run.columns["T"], WARM)
+    (told,) = [finding.message for finding in run.findings if finding.code == "other_columns"]
+    assert told == "'T' of 'inner' is read; an import profile reads that of 'rack'"
+
+
+def test_messages_of_a_seismometers_logger_beside_its_samples(tmp_path):
+    """State of health stands in channels of text whose rate is 0."""
+    pymseed = pytest.importorskip("pymseed")
+    path = tmp_path / "log.mseed"
+    files.miniseed(path)
+    record = pymseed.MS3Record()
+    record.sourceid, record.samprate, record.reclen = "FDSN:XX_STA__L_O_G", 0.0, 512
+    record.formatversion, record.encoding = 3, pymseed.DataEncoding.TEXT
+    record.set_starttime_str("2026-01-01T00:00:00Z")
+    with record.with_datasamples(b"clock locked", "t"):
+        path.write_bytes(path.read_bytes() + b"".join(bytes(part) for part in record.generate()))
+    run = read_run(path)
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+    assert run.facts.started == STARTED
+
+
+def test_a_recording_in_parquet_began_when_its_clock_did(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    path = tmp_path / "run.parquet"
+    files.parquet(path)
+    frame = pandas.read_parquet(path)
+    frame.insert(0, "exported", pandas.Timestamp("2026-06-30T12:00:00"))
+    frame.to_parquet(path, index=False)
+    assert read_run(path).facts.started == STARTED
+
+
 def test_the_reader_of_the_recipe_gives_its_columns(tmp_path):
     text = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
     code = text.partition("## Add a reader")[2].partition("```python\n")[2].partition("```")[0]
