@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.escaping import visible
 from fogml.numerals import duration
 from fogml.runs.columns import column_spec, is_accepted, parse_header
 from fogml.runs.container_files import groups_of
@@ -70,7 +71,8 @@ def draft_profile(path: Path) -> str:
         *layout,
         *_columns(fields),
     ]
-    return "\n".join(lines) + "\n"
+    # Names may hold marks that end a line of YAML.
+    return "\n".join(map(visible, lines)) + "\n"
 
 
 def _of_text(path: Path) -> tuple[list[str], list[_Field]]:
@@ -184,7 +186,8 @@ def _of_container(path: Path, kind: str) -> tuple[list[str], list[_Field]]:
 def _columns(fields: Sequence[_Field]) -> list[str]:
     """The keys that say which field is which."""
     left = list(fields)
-    lines = ["columns:", *_clock(left)]
+    clock = _clock(left)
+    lines = ["columns:", *clock]
     gyros = _taken(left, lambda f: f.name == "gyro" or f.name.startswith("gyro_")) or _taken(
         left, lambda f: bool(_GYRO.search(f.name)) and not _DATE.search(f.name)
     )
@@ -206,7 +209,7 @@ def _columns(fields: Sequence[_Field]) -> list[str]:
         lines.append(f"  # T: {{source: {_quoted(rest[0].source)}, unit: degC}}    # a drift model needs one")
     if many:
         lines.append("axes: {" + ", ".join(f"{axis}: {_quoted(f.source)}" for axis, f in axes.items()) + "}")
-    if "time" not in "".join(lines[1:3]):
+    if not clock:
         lines.append(f"sample_s: 0.01    {_MARK}no clock was found; write the true interval [s]")
     others = [*left, *([] if many else gyros[1:])]
     rest = [f for f in others if isinstance(f.source, str) and (np.isfinite(f.numbers).any() or not f.first)]

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from fogml.errors import InputError, known_are, quoted
-from fogml.runs.columns import KNOWN, column_spec, is_accepted
+from fogml.runs.columns import KNOWN, column_spec, is_accepted, parse_header
 from fogml.runs.facts import NAMES, Facts
 from fogml.runs.profile_parts import (
     STAMP,
@@ -123,8 +124,13 @@ class ImportProfile(TextLayout):
                 raise ValueError(f"key 'legs.{leg}': [first row, row after the last] was expected")
             if isinstance(part, LegByTime) and not part.from_s < part.to_s:
                 raise ValueError(f"key 'legs.{leg}': 'to_s' must be later than 'from_s'")
+            if isinstance(part, LegByState):
+                _check_filter(f"legs.{leg}", part)
+        for rule in self.where:
+            _check_filter("where", rule)
         for log in self.join:
             check_joined(log)
+        self._check_names()
         for key, names in (("axes", self.axes), ("legs", self.legs)):
             for name in names:
                 # Files are named after them.
@@ -143,6 +149,17 @@ class ImportProfile(TextLayout):
         if not known:
             raise ValueError(f"key 'encoding': no text encoding is called {quoted(self.encoding)}")
         return self
+
+    def _check_names(self) -> None:
+        """Refuse two columns of one name, and those of the run format that no unit is stated for."""
+        names = [*self.columns, *(name for log in self.join for name in log.columns if name != "time")]
+        kept = [parse_header(source)[0] for source in self.keep]
+        for name in kept:
+            if column_spec(name) is not None:
+                raise ValueError(f"key 'keep': {quoted(name)} is of the run format; state it under 'columns'")
+        twice = next((name for name, count in Counter([*names, *kept]).items() if count > 1), None)
+        if twice is not None:
+            raise ValueError(f"column {quoted(twice)} is stated twice by 'columns', 'join' and 'keep'")
 
     def _check_positions(self, fields: int) -> None:
         for source in (*self.sources, *self.text_sources):
@@ -173,6 +190,17 @@ def check_joined(log: JoinedLog) -> None:
     if "time" not in log.columns or "gyro" in log.columns or len(log.columns) < 2:
         raise ValueError("key 'join.columns': 'time' and columns beside 'gyro' were expected")
     _check_units(log.columns)
+    for rule in log.where:
+        _check_filter("join.where", rule)
+
+
+def _check_filter(key: str, rule: RowFilter) -> None:
+    """Refuse a rule that keeps every row, or that orders texts."""
+    in_range = rule.at_least is not None or rule.at_most is not None
+    if rule.texts and in_range:
+        raise ValueError(f"key '{key}': texts have no range; state 'equals', or 'at_least' and 'at_most'")
+    if not in_range and not rule.texts and not rule.numbers:
+        raise ValueError(f"key '{key}': 'equals', 'at_least' or 'at_most' was expected")
 
 
 def _check_columns(profile: ImportProfile) -> None:

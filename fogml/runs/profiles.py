@@ -259,9 +259,19 @@ def _columns(
                 "once it is scaled; correct 'scale', 'offset' or 'sample_s' in the profile"
             )
     start = 0.0 if profile.sample_s is None or not len(rows) else float(rows[0]) * profile.sample_s
-    for log in joined:
-        for name in log.keys() - {"time"}:
-            columns[name] = interpolated(columns["time"], log["time"] - start, log[name])
+    for log, held in zip(profile.join, joined):
+        at, time = held["time"] - start, columns["time"]
+        begin, end = float(np.nanmin(at)), float(np.nanmax(at))
+        if not (begin <= np.nanmax(time) and np.nanmin(time) <= end):
+            name = log.file.replace("{stem}", plain_path(Path(file)).stem)
+            raise InputError(
+                f"{file}: the joined {name} covers {begin:.10g} to {end:.10g} s of the recording's clock, "
+                f"which shows {np.nanmin(time):.10g} to {np.nanmax(time):.10g} s; it needs dates in both, "
+                "or 'offset_s' in the profile"
+            )
+        for name in held:
+            if name != "time":
+                columns[name] = interpolated(time, at, held[name])
     for source in profile.keep:
         columns[parse_header(source)[0]] = large.chosen(table.columns[source], part)
     order = ["time", "gyro", *(name for name in columns if name not in ("time", "gyro"))]

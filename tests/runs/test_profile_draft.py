@@ -106,6 +106,17 @@ def test_a_matrix_of_matlab(tmp_path):
     np.testing.assert_array_equal(run.gyro, np.sin(TIME))
 
 
+@pytest.mark.parametrize("name", ["runtime gyro", "gyro\u2028legs: {a: [0, 1]}", "gyro\x85x", "gyro \u202ey"])
+def test_a_name_of_any_characters_is_the_source_and_no_other_key(tmp_path, name):
+    """Nor is a word for time in it taken for a clock."""
+    rows = "".join(f"{7.6 + 0.01 * (i * 7 % 13):.3f},{25 + i * 7 % 11},{i % 3}\n" for i in range(40))
+    (tmp_path / "log.csv").write_text(f'"{name}",die,"flag\u2028b"\n{rows}', encoding="utf-8")
+    (tmp_path / "p.yaml").write_text(draft_profile(tmp_path / "log.csv"), encoding="utf-8")
+    profile = load_profile(tmp_path / "p.yaml")
+    assert profile.columns["gyro"].source == name
+    assert profile.sample_s == 0.01 and not profile.legs
+
+
 def test_the_command_writes_it_and_shows_the_first_rows(tmp_path):
     files.npz(tmp_path / "log.npz")
     profile = tmp_path / "profile.yaml"

@@ -118,6 +118,33 @@ def test_a_thermometers_log_of_another_rate_is_joined_at_its_true_times(read, tm
     np.testing.assert_allclose(run.columns["T_chamber"], right, atol=1e-9)
 
 
+def test_a_joined_log_of_another_day_or_without_dates_is_refused(read, tmp_path):
+    """Its first or last value would be held all through the recording."""
+    rows = "".join(f"23:59:{50 + i}\t300,25\n" for i in range(4))
+    (tmp_path / "log-oven.txt").write_text("When\tOven\n" + rows)
+    with pytest.raises(
+        InputError, match=r"the joined log-oven\.txt covers -17746560\d\d to .* dates in both"
+    ):
+        read(HEAD + COLUMNS + JOIN, log())
+
+
+def test_columns_come_in_the_order_of_the_profile(read, tmp_path):
+    """Also those of a joined log, of which the first temperature may lead."""
+    names = ["T_top", "T_bottom", "T_case", "T_chamber", "T_electronics", "supply", "power", "humidity"]
+    (tmp_path / "log-oven.txt").write_text(
+        "t," + ",".join(names) + "\n0" + ",1" * 8 + "\n20" + ",1" * 8 + "\n"
+    )
+    units = ["degC"] * 5 + ["V", "W", "%"]
+    joined = "".join(f"      {n}: {{source: {n}, unit: '{u}'}}\n" for n, u in zip(names, units, strict=True))
+    profile = (
+        "schema: fogml.import/1\ndescription: a bench\nsample_s: 0.5\ncolumns:\n"
+        '  gyro: {source: g, unit: deg/h}\njoin:\n  - file: "{stem}-oven.txt"\n    columns:\n'
+        "      time: {source: t, unit: s}\n" + joined
+    )
+    (run,) = read(profile, "g\n" + "7.5\n7.25\n" * 20)
+    assert list(run.columns) == ["time", "gyro", *names]
+
+
 def test_a_clock_is_repaired_where_the_profile_says_so(read):
     text = "t,w,d\n" + "".join(f"{i % 256 * 256},{i},25\n" for i in range(600))
     profile = HEAD.replace("header_text: Omega\n", "") + (
@@ -152,6 +179,12 @@ def test_fields_of_a_container_by_group(read, tmp_path):
         ("legs: {a: {from_s: 4, to_s: 4}}\n", "'to_s' must be later"),
         ("join: [{file: ../x, columns: {}}]\n", "a name in the recording's folder"),
         ("join: [{file: x, columns: {T: {source: a, unit: degC}}}]\n", "'time' and columns"),
+        ("where: [{source: State}]\n", "key 'where': 'equals', 'at_least' or 'at_most' was expected"),
+        ("legs: {a: {source: State}}\n", "key 'legs.a': 'equals', 'at_least' or 'at_most'"),
+        ("where: [{source: State, equals: up, at_most: 2}]\n", "texts have no range"),
+        ('keep: ["T_case [K]"]\n', "key 'keep': 'T_case' is of the run format; state it under 'columns'"),
+        ('keep: ["P [bar]", "P [mbar]"]\n', "column 'P' is stated twice"),
+        (JOIN.replace("T_chamber", "T"), "column 'T' is stated twice"),
         (
             "where: [{source: State, equal: up}]\n",
             "unknown key 'where.0.equal'; did you mean 'equals'. known keys are source",
