@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,6 +18,7 @@ from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 from fogml.signals.output_filters import AFTER, term_shapes
 from fogml.signals.slow_noise import ramp
 from fogml.signals.spectrum_fit import SpectrumFit
+from fogml.signals.term_intervals import term_interval
 
 TermName = Literal["Q", "N", "B", "K", "R"]
 
@@ -127,8 +128,9 @@ def noise_terms(
     The density of quantisation, white noise, flicker and random walk (IEEE Std 952, annex C) behind an
     output filter if the data show one, of greatest likelihood with coefficients that are not negative; the
     ramp is the constant of the spectrum's first columns, straight lines. Intervals are those of the profile
-    likelihood, with models weighed by their evidence; where rows scatter more than they should, the excess
-    counts as error of every row.
+    likelihood, with models weighed by their evidence, as far as bounds of the other terms let them reach
+    (`fogml.signals.term_intervals`); where rows scatter more than they should, the excess counts as error of
+    every row.
 
     B is the minimum of the Allan deviation over 0.664, the value that data sheets give, and its interval
     covers both that and the flicker of the model. A term whose interval reaches 0 is not supported by
@@ -161,7 +163,7 @@ def noise_terms(
     search = search_noise(spectrum)
     terms: dict[TermName, NoiseTerm] = {}
     for name in TERM_NAMES[:-1]:
-        low, high = _interval(search, name, level)
+        low, high = term_interval(search, name, level)
         fitted, lower, upper = (_SCALES[name] * float(np.sqrt(v)) for v in (search.best[name], low, high))
         terms[name] = NoiseTerm(fitted if fitted > 0 else None, lower, upper, _UNITS[name], fitted)
     terms["R"] = _ramp(search, terms["K"], level, ramps)
@@ -202,72 +204,6 @@ def _holds_from(search: NoiseSearch, taus: FloatArray) -> float:
     if fit.filter.kind == "none" and not np.all(fit.used):
         first = max(first, 1.0 / float(spectrum.frequency_hz[fit.used].max()))
     return first
-
-
-def _interval(search: NoiseSearch, name: str, level: float) -> tuple[float, float]:
-    """Profile likelihood interval of a coefficient; from 0 where models without it fit as well."""
-    from scipy.special import ndtri
-
-    allowed = float(ndtri(0.5 + 0.5 * level))
-    value = search.best[name]
-    names = search.best.terms.names
-    model = search.candidates[0].model
-    shape = model.design(search.best.log_corner)[0][:, names.index(name)]
-    # The scale on which the term alone would be told from the others' scatter.
-    used = search.best.used
-    share = shape[used] / search.best.density[used]
-    information = 0.5 * float(np.sum(model.freedom[used] * share**2))
-    scale = allowed / np.sqrt(information) if information > 0.0 else max(value, 1e-300)
-    fits: dict[int, SpectrumFit] = {}
-    least = search.profile_loss(name, value, fits)
-
-    def beyond(coefficient: float) -> float:
-        """Standard errors beyond the allowed ones: straight in the coefficient, nearly."""
-        lost = search.profile_loss(name, coefficient, fits) - least
-        return float(np.sqrt(2.0 * max(lost, 0.0))) - allowed
-
-    def end(limit: float, direction: float) -> float:
-        """Where the loss is the allowed one, from the best value on; at the limit if it is nowhere."""
-        near, at_near, reach = value, -allowed, 1.1 * scale
-        while True:
-            far = value + direction * reach
-            if (far - limit) * direction >= 0.0:
-                far = limit
-            at_far = beyond(far)
-            if at_far > 0.0:
-                return _crossing(beyond, (near, at_near), (far, at_far), 2e-2 * min(scale, max(value, scale)))
-            if far == limit:
-                return limit
-            near, at_near = far, at_far
-            # As far again as the straight line says, and a little more.
-            reach *= float(np.clip(1.2 * allowed / max(at_far + allowed, 1e-3), 1.2, 4.0))
-
-    upper = end(value + 1e12 * max(scale, value), 1.0)
-    fits.clear()
-    if value == 0.0 or beyond(0.0) <= 0.0:
-        return 0.0, upper
-    fits.clear()
-    return end(0.0, -1.0), upper
-
-
-def _crossing(
-    f: Callable[[float], float], low: tuple[float, float], high: tuple[float, float], tolerance: float
-) -> float:
-    """Root of a nearly straight function between two points of known values, by the Illinois rule.
-
-    Values at the ends are not asked again: a fit that begins elsewhere may give a slightly other one.
-    """
-    (a, at_a), (b, at_b) = low, high
-    for _ in range(30):
-        c = (a * at_b - b * at_a) / (at_b - at_a)
-        at_c = f(c)
-        if (at_c > 0.0) == (at_b > 0.0):
-            b, at_b, at_a = c, at_c, 0.5 * at_a
-        else:
-            a, at_a, b, at_b = b, at_b, c, at_c
-        if abs(b - a) <= tolerance or abs(at_c) <= 1e-3:
-            return c
-    return c
 
 
 def _ramp(search: NoiseSearch, walk: NoiseTerm, level: float, ramps: int | None) -> NoiseTerm:

@@ -237,12 +237,7 @@ class SpectrumModel:
         norms[norms == 0.0] = 1.0
         scaled /= norms
         both = np.column_stack((scaled, weight * (density - given)))
-        taken, low = told.taken, slice(self._single)
-        left = np.ones(len(density))
-        left[low] -= 2.0 * np.sum(taken**2, axis=1)
-        moments = scaled.T @ (left[:, None] * both)
-        pairs = (taken[:, :, None] * taken[:, None, :]).reshape(self._single, -1)
-        moments += (pairs.T @ scaled[low]).T @ (pairs.T @ both[low])
+        moments = self._moments(scaled, both, told.taken)
         information = moments[:, :-1]
         told_by = np.diag(information) > _ROUNDED
         size = np.where(told_by, np.sqrt(np.maximum(np.diag(information), _ROUNDED)), np.inf)
@@ -250,6 +245,23 @@ class SpectrumModel:
         pull = (moments[:, -1] + scaled.T @ (weight * (told.power - density))) / size
         root = np.sqrt(np.maximum(values, _ROUNDED))
         return np.asarray(nnls(root[:, None] * vectors.T, vectors.T @ pull / root)[0] / size / norms)
+
+    def _moments(self, scaled: FloatArray, others: FloatArray, taken: FloatArray) -> FloatArray:
+        """Products of columns over the density with others, less what constants of the spectrum's take."""
+        low, left = slice(self._single), np.ones(len(scaled))
+        left[low] -= 2.0 * np.sum(taken**2, axis=1)
+        pairs = (taken[:, :, None] * taken[:, None, :]).reshape(self._single, -1)
+        beside = (pairs.T @ scaled[low]).T @ (pairs.T @ others[low])
+        return np.asarray(scaled.T @ (left[:, None] * others) + beside)
+
+    def information(self, fit: SpectrumFit, excess: float = 0.0) -> FloatArray:
+        """Fisher's information of a fit's coefficients and, last, its corner if that is free."""
+        freedom = self.freedom / (1.0 + 0.5 * self.freedom * excess)
+        columns, slopes = self.design(fit.log_corner)
+        if slopes is not None:
+            columns = np.column_stack((columns, slopes @ fit.coefficients))
+        scaled = columns * (np.sqrt(0.5 * freedom) / np.where(self.used, fit.density, 1.0))[:, None]
+        return self._moments(scaled, scaled, self._told(fit.density, freedom).taken)
 
     def scanned(self, corners: FloatArray) -> SpectrumFit:
         """The fit that goes on from the corner which leads the furthest in a few rounds."""
