@@ -99,7 +99,8 @@ PARTS: tuple[tuple[str, ModuleType, int, str], ...] = (
         60,
         "Of B and R that are none an interval begins at 0. Before, R was told where there is none in "
         "27 % of runs of navigation grade at 10 Hz over 4 h, as its error left out a random walk that hardly "
-        "shows.",
+        "shows; N lay above its interval in 10 % of runs of white noise, as other terms, which cannot be "
+        "negative, were taken for free to be so.",
     ),
     (
         "Noise floors of a judgement (`train`, `compare`)",

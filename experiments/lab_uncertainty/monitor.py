@@ -73,7 +73,7 @@ def recorded(months: Months, rng: np.random.Generator) -> tuple[FloatArray, Floa
 
 def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
     """Rows of one case."""
-    months, false, onset, others = CASES[name], 0, [], []
+    months, false, again, onset, others = CASES[name], 0, 0, [], []
     sizes: list[Told | None] = []
     for repeat in range(repeats):
         rng = np.random.default_rng([seed, repeat])
@@ -86,6 +86,7 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
             continue
         false += any(change.raised_at < months.onset for change in chart.changes)
         real = [change for change in chart.changes if change.raised_at >= months.onset]
+        again += len(real) > 1
         others += [(one.shape != months.shape, 1.0 - one.probability) for one in real[:1]]
         if real and real[0].shape == months.shape:
             sizes.append(of_interval(real[0].size, size, real[0].size_ci90))
@@ -100,4 +101,6 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
         )
         wrong, stated = np.array(others, dtype=np.float64).T
         rows.append(share(name, "of another shape", int(wrong.sum()), len(others), float(stated.mean())))
+        since = RUNS - months.onset
+        rows.append(share(name, f"a further alarm in {since} runs", again, len(others), since / LIMIT))
     return rows

@@ -29,6 +29,7 @@ class Still:
 COUNTS = Noise(0.001, 0.002, 0.005, count_arcsec=0.01)
 CASES: dict[str, Still] = {
     "white, 4 h": Still(Noise(0.02)),
+    "white, 5 s apart, 12 h": Still(Noise(0.02), hours=12.0, step_s=5.0),
     "white and ramp, 4 h": Still(Noise(0.02), ramp=0.5),
     "tactical, 4 h": Still(TACTICAL),
     "tactical, 4 h, 6 pauses": Still(TACTICAL, pauses=6),

@@ -21,6 +21,10 @@ for w and q as likely as assumed: an alarm once the sum passes A comes falsely n
 the mean, whatever mean and sigma are (S. W. Roberts, "A comparison of some control chart procedures",
 Technometrics 8, 1966; J. Shin, A. Ramdas & A. Rinaldo, "E-detectors", 2023).
 
+After an alarm the evidence begins anew with the last of the runs that the change may have begun with. The
+figure that changed may go on: without a further change its mean is constant, or follows a line over the age
+(n - 2 for n - 1), as likely. A ramp that goes on raises no alarm, one that ends does.
+
 An alarm stands as it was raised. What changed, how and since when is told anew with every run that follows up
 to the next change: two runs hardly tell a step from a ramp.
 """
@@ -65,6 +69,8 @@ class Change:
         The same with the runs since.
     probability
         Of this figure and shape among all.
+    off_course
+        Whether the figure had changed before: then this is off the constant or the line that it went since.
     """
 
     raised_at: int
@@ -77,6 +83,7 @@ class Change:
     statistic: float
     latest_statistic: float
     probability: float
+    off_course: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,13 +93,16 @@ class Chart:
     Attributes
     ----------
     statistic
-        Sum of the evidences, shape (n,); after an alarm it begins anew with the runs from its onset on.
+        Sum of the evidences, shape (n,); after an alarm it begins anew with the runs since the change.
     changes
         The alarms, in order.
+    begins
+        Index of the run that the last evidence begins with.
     """
 
     statistic: FloatArray
     changes: tuple[Change, ...]
+    begins: int = 0
 
 
 def change_chart(
@@ -144,43 +154,50 @@ def change_chart(
         raise InputError(f"{runs_between_false_alarms} runs between false alarms: at least 1 is needed")
     statistic = np.zeros(len(age))
 
-    def evidence(first: int, stop: int) -> dict[str, FigureEvidence]:
-        """Of runs from `first` on, `stop` left out."""
+    def evidence(first: int, stop: int, moved: frozenset[str]) -> dict[str, FigureEvidence]:
+        """Of runs from `first` on, `stop` left out, where some figures may go along a line."""
         return {
             name: FigureEvidence(
-                values[:stop], age[:stop], first, prior, _until((errors or {}).get(name), stop)
+                values[:stop],
+                age[:stop],
+                first,
+                prior,
+                _until((errors or {}).get(name), stop),
+                moves=name in moved,
             )
             for name, values in figures.items()
         }
 
-    raised: list[tuple[int, Change]] = []
+    raised: list[tuple[int, frozenset[str], Change]] = []
     first = place = 0
+    moved: frozenset[str] = frozenset()
     stop = _FEW_RUNS
     while place < len(age):
         # Not all runs at once, as those after an alarm are judged anew.
-        charts = evidence(first, stop)
+        charts = evidence(first, stop, moved)
         while place < min(stop, len(age)):
             logs, statistic[place] = _statistic(charts, place)
             place += 1
             if statistic[place - 1] >= runs_between_false_alarms:
-                raised.append((first, _change(charts, logs, place - 1, statistic[place - 1])))
-                first = max(raised[-1][1].onset, first + 1)
+                change = _change(charts, logs, place - 1, statistic[place - 1])
+                raised.append((first, moved, change))
+                first, moved = max(change.onset_ci90[1], first + 1), moved | {change.figure}
                 stop = place + _FEW_RUNS
                 break
         else:
             stop = 2 * stop
-    nexts = [change.onset for _, change in raised[1:]]
+    nexts = [change.onset for *_, change in raised[1:]]
     changes = []
-    for (begin, change), end in zip(raised, [*nexts, len(age)]):
+    for (begin, lines, change), end in zip(raised, [*nexts, len(age)]):
         # More runs than are judged at first tell no more of what changed.
         end = min(end, change.raised_at + _FEW_RUNS)
         if end > change.raised_at + 1:
-            charts = evidence(begin, end)
+            charts = evidence(begin, end, lines)
             logs, latest = _statistic(charts, end - 1)
             told = _change(charts, logs, change.raised_at, change.statistic)
             change = replace(told, latest_statistic=latest)
-        changes.append(change)
-    return Chart(statistic, tuple(changes))
+        changes.append(replace(change, off_course=change.figure in lines))
+    return Chart(statistic, tuple(changes), first)
 
 
 def _statistic(charts: Mapping[str, FigureEvidence], place: int) -> tuple[dict[str, FloatArray], float]:

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.special import gammaln
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.signals.distributions import students_ppf
@@ -89,6 +90,10 @@ class FigureEvidence:
         What is taken for granted.
     errors
         Standard error of each value, shape (n,); None for values that are told alike.
+    moves
+        Whether the figure may as well go along a line over the age, so that what departs from both is a
+        change. Runs before the first are one more, and what they make of a line's slope is where it begins:
+        from them on both are as likely (J. O. Berger & L. R. Pericchi, J. Am. Stat. Assoc. 91, 1996).
 
     Attributes
     ----------
@@ -98,13 +103,20 @@ class FigureEvidence:
     """
 
     def __init__(
-        self, values: FloatArray, age: FloatArray, first: int, prior: ChangePrior, errors: FloatArray | None
+        self,
+        values: FloatArray,
+        age: FloatArray,
+        first: int,
+        prior: ChangePrior,
+        errors: FloatArray | None,
+        *,
+        moves: bool = False,
     ) -> None:
         told = np.isfinite(values[first:])
         if errors is not None:
             told &= np.isfinite(errors[first:])
         self._rows = first + np.flatnonzero(told)
-        self._baseline = prior.baseline_runs
+        self._baseline = prior.baseline_runs + moves
         self._unconfirmed = prior.confirming_runs - 1
         self._done = 0
         self.logs: FloatArray = np.empty((0, len(SHAPES)))
@@ -118,6 +130,7 @@ class FigureEvidence:
         start = self._baseline
         interval = (self._age[start - 1] - self._age[0]) / (start - 1)
         self._t = (self._age - self._age[0]) / interval if interval > 0.0 else np.arange(float(n))
+        self._usual = np.column_stack((np.ones(n), self._t))
         self._sizes = np.square(np.array([prior.sizes, prior.ramp_sizes]))
         own = None if errors is None else np.square(errors[self._rows])
         between = np.array(prior.between)
@@ -126,7 +139,10 @@ class FigureEvidence:
         else:
             # No run is told so well that all others count for nothing beside it.
             own = np.maximum(own / np.exp(np.mean(np.log(own[:start]))), 1e-9)
-        w, q = (part.ravel() for part in np.meshgrid(between, prior.wander))
+        widths = range(1, 2 + moves)
+        w, q, width = (part.ravel() for part in np.meshgrid(between, prior.wander, widths))
+        order = np.argsort(width, kind="stable")
+        w, q, self._widths = w[order], q[order], width[order]
         self._white = w[:, None] + (1.0 - w[:, None]) * own
         self._wander, self._flicker = q, flicker_covariance(self._t, prior.longest_wander)
         self._judge()
@@ -149,42 +165,47 @@ class FigureEvidence:
     def _judge(self) -> None:
         """Log evidence by the first 1 to n told runs; covariance by covariance, as all take much room."""
         n, start = len(self._y), self._baseline
-        count, pair = np.arange(1.0, n + 1.0), np.column_stack((self._y, np.ones(n)))
+        count, known = np.arange(1.0, n + 1.0), np.column_stack((self._y, self._usual))
         plain, least = np.empty((len(self._wander), n)), np.full(n, np.inf)
         with np.errstate(divide="ignore", invalid="ignore"):
-            for model in range(len(plain)):
-                z, log_dets = self._whitened(model, pair)
-                ones, about = _about(z)
+            for model, width in enumerate(self._widths):
+                z, log_dets = self._whitened(model, known[:, : 1 + width])
+                _, volume, _, about = _about(z)
                 least = np.minimum(least, about)
-                plain[model] = -log_dets - 0.5 * np.log(ones) - 0.5 * (count - 1.0) * np.log(about)
+                plain[model] = _marginal(log_dets + volume, about, np.maximum(count - width, 0.5))
         silent = ~(least > count * np.maximum.accumulate(self._least))
         plain[:, silent] = 0.0
-        weights = plain - np.logaddexp.reduce(plain)
+        # Constants and lines are as likely from the first runs on.
+        kinds = [np.logaddexp.reduce(plain[self._widths == width, start - 1]) for width in self._widths]
+        self._shift = np.array(kinds)
+        weights = plain - self._shift[:, None]
+        weights -= np.logaddexp.reduce(weights)
         columns = self._columns()
         sizes = np.tile(self._sizes, (n - start, 1))
         valid = np.repeat(np.arange(start, n), len(SHAPES))
         self._all = np.full(columns.shape, -np.inf)
-        for model in range(len(plain)):
-            z, _ = self._whitened(model, np.column_stack((pair, columns)))
-            ones, about = _about(z[:, :2])
-            about[silent], sums = 1.0, np.zeros((3, columns.shape[1]))
-            share = np.cumsum(z[:, 0] * z[:, 1]) / ones
+        for model, width in enumerate(self._widths):
+            z, _ = self._whitened(model, np.column_stack((known[:, : 1 + width], columns)))
+            turn, _, along, about = _about(z[:, : 1 + width])
+            about[silent], sums = 1.0, np.zeros((2 + width, columns.shape[1]))
             for first in range(start, n, _ROWS):
                 rows = slice(first, min(first + _ROWS, n))
                 # Changes that begin later add nothing yet.
-                known = slice(0, len(SHAPES) * (rows.stop - start))
-                part = z[rows, 2:][:, known]
-                products = (part * z[rows, :1], part * z[rows, 1:2], part**2)
-                of_values, of_mean, squares = sums[:, None, known] + np.cumsum(products, axis=1)
-                sums[:, known] = of_values[-1], of_mean[-1], squares[-1]
-                v = np.maximum(squares - of_mean**2 / ones[rows, None], 0.0)
-                b = np.square(of_values - of_mean * share[rows, None]) / about[rows, None]
-                freedom = 0.5 * (count[rows, None] - 1.0)
-                later = count[rows, None] <= valid[known]
+                begun = slice(0, len(SHAPES) * (rows.stop - start))
+                part = z[rows, 1 + width :][:, begun]
+                products = np.stack([part**2, *(part * z[rows, i, None] for i in range(1 + width))])
+                products = sums[:, None, begun] + np.cumsum(products, axis=1)
+                sums[:, begun] = products[:, -1]
+                of_usual = np.einsum("nij,jnm->inm", turn[rows], products[2:])
+                v = np.maximum(products[0] - np.sum(of_usual**2, axis=0), 0.0)
+                b = products[1] - np.einsum("inm,ni->nm", of_usual, along[rows])
+                explained = np.square(b) / about[rows, None]
+                freedom = 0.5 * (count[rows, None] - width)
+                later = count[rows, None] <= valid[begun]
                 for size in sizes.T:
-                    ratios = weights[model, rows, None] + _gain(size[known], v, b, freedom)
+                    ratios = weights[model, rows, None] + _gain(size[begun], v, explained, freedom)
                     ratios[later] = -np.inf
-                    self._all[rows, known] = np.logaddexp(self._all[rows, known], ratios)
+                    self._all[rows, begun] = np.logaddexp(self._all[rows, begun], ratios)
         self._all -= np.log(self._sizes.size)
         self._all[silent] = -np.inf
 
@@ -219,34 +240,37 @@ class FigureEvidence:
             unit = float(np.ptp(self._age[:n]) / np.ptp(self._t[:n]))
         else:
             unit = 1.0
-        table = np.column_stack((self._y, np.ones(len(self._y)), columns))
         parts = []
-        for model in range(len(self._wander)):
+        for model, width in enumerate(self._widths):
+            free = n - float(width)
+            table = np.column_stack((self._y, self._usual[:, :width], columns))
             z, log_dets = self._whitened(model, table)
             z = z[:n]
-            # A line through whitened runs: of each column and of the values what is left beside the mean.
-            length = np.linalg.norm(z[:, 1])
-            mean = z[:, 1] / length
-            left = z - np.outer(mean, mean @ z)
-            y, x = left[:, 0], left[:, 2:]
+            # Of each column and of the values what is left beside what is usual.
+            basis, upper = np.linalg.qr(z[:, 1 : 1 + width])
+            left = z - basis @ (basis.T @ z)
+            y, x = left[:, 0], left[:, 1 + width :]
             about, v = float(y @ y), np.sum(x**2, axis=0)
-            told = v > 1e-18 * np.sum(z[:, 2:] ** 2, axis=0)
+            told = v > 1e-18 * np.sum(z[:, 1 + width :] ** 2, axis=0)
             if not told.any() or not about > 0.0:
                 continue
             v, products = v[told], y @ x[:, told]
             sizes = products / v
             residual = np.maximum(about - products * sizes, 0.0)
             sizes_before = self._sizes[shape][:, None]
-            logs = np.logaddexp.reduce(_gain(sizes_before, v, products**2 / about, 0.5 * (n - 1)))
-            plain = -log_dets[n - 1] - np.log(length) - 0.5 * (n - 1) * np.log(about)
-            parts.append((logs + plain, sizes, np.sqrt(residual / (n - 2) / v)))
+            logs = np.logaddexp.reduce(_gain(sizes_before, v, products**2 / about, 0.5 * free))
+            volume = float(np.sum(np.log(np.abs(np.diag(upper)))))
+            plain = _marginal(log_dets[n - 1] + volume, about, free) - self._shift[model]
+            scales = np.sqrt(residual / (free - 1.0) / v)
+            parts.append((logs + plain, sizes, scales, np.full_like(sizes, free - 1.0)))
         if not parts:
             return [0.0 if level == 0.5 else float(np.copysign(np.inf, level - 0.5)) for level in levels]
-        logs, sizes, scales = (np.concatenate(part) for part in zip(*parts))
+        logs, sizes, scales, freedom = (np.concatenate(part) for part in zip(*parts))
         scales = np.maximum(scales, np.spacing(np.abs(sizes)))
         shares = np.exp(logs - np.logaddexp.reduce(logs))
         kept = shares > 1e-12
-        found = students_ppf(levels, shares[kept] / shares[kept].sum(), sizes[kept], scales[kept], n - 2)
+        shares = shares[kept] / shares[kept].sum()
+        found = students_ppf(levels, shares, sizes[kept], scales[kept], freedom[kept])
         return [float(value) / unit for value in found]
 
 
@@ -259,7 +283,39 @@ def _gain(size: FloatArray, v: FloatArray, explained: FloatArray, freedom: Float
     return np.asarray(-0.5 * np.log(wide) - freedom * np.log1p(-gained))
 
 
-def _about(z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Of whitened values and ones, run by run: the ones' squares, and the values' about their mean, (n,)."""
-    ones = np.cumsum(z[:, 1] ** 2)
-    return ones, np.cumsum(z[:, 0] ** 2) - np.cumsum(z[:, 0] * z[:, 1]) ** 2 / ones
+def _marginal(log_volume: FloatArray, about: FloatArray | float, freedom: FloatArray | float) -> FloatArray:
+    """Log likelihood of squares about what is usual, its constants and the deviation integrated out."""
+    half = 0.5 * freedom
+    return np.asarray(gammaln(half) - log_volume - half * np.log(np.pi * about))
+
+
+def _about(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Of whitened values and the columns of what is usual, one or two, run by run.
+
+    Returns
+    -------
+    turn
+        What makes sums of products with the columns orthonormal, shape (n, columns, columns).
+    volume
+        Logarithm of what the columns span, shape (n,).
+    along
+        Products of the values with the orthonormal columns, shape (n, columns).
+    about
+        Squares of what the values are beside the columns, shape (n,).
+    """
+    y, usual = z[:, 0], z[:, 1:]
+    width = usual.shape[1]
+    products = np.cumsum(usual[:, :, None] * z[:, None, :], axis=0)
+    turn = np.zeros((len(z), width, width))
+    turn[:, 0, 0] = 1.0 / np.sqrt(products[:, 0, 1])
+    if width == 2:
+        share = products[:, 0, 2] / products[:, 0, 1]
+        rest = products[:, 1, 2] - share * products[:, 0, 2]
+        # A line through one run, or through runs of one age, is none.
+        told = rest > 1e-12 * products[:, 1, 2]
+        turn[told, 1, 1] = 1.0 / np.sqrt(rest[told])
+        turn[:, 1, 0] = -share * turn[:, 1, 1]
+    sizes = np.diagonal(turn, axis1=1, axis2=2)
+    volume = -np.sum(np.log(np.where(sizes > 0.0, sizes, 1.0)), axis=1)
+    along = np.einsum("nij,nj->ni", turn, products[:, :, 0])
+    return turn, volume, along, np.cumsum(y**2) - np.sum(along**2, axis=1)

@@ -59,13 +59,16 @@ def _unit(unit: UnitWatch, limit: float) -> dict[str, Any]:
         "age": unit.age.tolist(),
         "runs": [asdict(record) for record in unit.records],
         "statistic": unit.chart.statistic.tolist(),
-        "alarms": [_alarm(unit, change, limit) for change in unit.chart.changes],
+        "alarms": [
+            _alarm(unit, change, unit.chart.changes[place:], limit)
+            for place, change in enumerate(unit.chart.changes, start=1)
+        ],
         "calibration": None if unit.calibration is None else _calibration(unit.calibration),
         "notes": list(unit.notes),
     }
 
 
-def _alarm(unit: UnitWatch, change: Change, limit: float) -> dict[str, Any]:
+def _alarm(unit: UnitWatch, change: Change, later: Sequence[Change], limit: float) -> dict[str, Any]:
     age, runs = unit.age, unit.records
     first, last = change.onset_ci90
     per = "" if change.shape == "step" else f" per {'day' if unit.dated else 'run'}"
@@ -82,6 +85,8 @@ def _alarm(unit: UnitWatch, change: Change, limit: float) -> dict[str, Any]:
         "stands": change.latest_statistic >= limit,
         "figure": change.figure,
         "shape": change.shape,
+        "off_course": change.off_course,
+        "goes_on": change.shape == "ramp" and all(one.figure != change.figure for one in later),
         "probability": change.probability,
         "size": change.size,
         "size_ci90": list(change.size_ci90),

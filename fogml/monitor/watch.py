@@ -224,7 +224,7 @@ def _watched(
     errors = {name: np.array([getattr(record, f"{name}_se") for record in records]) for name in FIGURES}
     chart = change_chart(figures, age, between, prior, errors)
     first = chart.changes[-1].onset if chart.changes else 0
-    since = len(records) - first
+    since = len(records) - chart.begins
     state: State = "alarm" if chart.changes else "steady"
     if not chart.changes and len(records) <= prior.baseline_runs:
         state = "baseline"

@@ -55,13 +55,15 @@ def alarm_words(alarm: Mapping[str, Any]) -> str:
         how = f"is {number(factors[0])} times what it was (90 %: {_interval(*factors[1:])})"
     elif alarm["shape"] == "ramp":
         how = f"drifts by {number(size)} {alarm['unit']} (90 %: {_interval(low, high)})"
+    if alarm["off_course"]:
+        how += " off its course of the runs before"
     first, last = alarm["onset_ci90"]
     between = "" if first == last else f", with 90 % between {first} and {last}"
     told = f" With the runs since the evidence is down to {number(alarm['latest_statistic'])}."
-    doubt = "" if alarm["stands"] else told
+    further = (" It goes on." if alarm["goes_on"] else "") if alarm["stands"] else told
     return (
         f"The {figure} {how} since {onset_words(alarm)} ({alarm['onset']}{between}); noticed with "
-        f"{alarm['raised_at']}.{doubt} Effects that do so: {', '.join(alarm['nearest'])}."
+        f"{alarm['raised_at']}.{further} Effects that do so: {', '.join(alarm['nearest'])}."
     )
 
 

@@ -64,15 +64,19 @@ def student_sf(value: ArrayLike, freedom: ArrayLike) -> Any:
 
 
 def students_ppf(
-    probability: ArrayLike, weights: FloatArray, centres: FloatArray, scales: FloatArray, freedom: float
+    probability: ArrayLike,
+    weights: FloatArray,
+    centres: FloatArray,
+    scales: FloatArray,
+    freedom: FloatArray | float,
 ) -> Any:
     """Value under which a mixture of Student's t about `centres` lies with a probability, by halving.
 
-    Weights and centres are of shape (m,), and so are scales, none of which is 0, or of the probability's
-    shape and m.
+    Weights and centres are of shape (m,), and so are degrees of freedom, if not one of all, and scales, none
+    of which is 0, or of the probability's shape and m.
     """
     asked = np.asarray(probability)
-    ends = centres + scales * student_ppf(asked, freedom)[..., None]
+    ends = centres + scales * student_ppf(asked, float(np.min(freedom)))[..., None]
     low, high = ends.min(axis=-1), ends.max(axis=-1)
     while np.any(high - low > 1e-12 * np.maximum(np.abs(low), np.abs(high))):
         middle = 0.5 * (low + high)

@@ -14,25 +14,28 @@ from scipy.stats import multivariate_normal
 
 from fogml.errors import InputError
 from fogml.monitor.changes import _change, change_chart
-from fogml.monitor.evidence import ChangePrior, flicker_covariance
+from fogml.monitor.evidence import ChangePrior, FigureEvidence, flicker_covariance
 from fogml.signals.random_noise import flicker_noise
 
 
-def _marginal(y, column, size, covariance):
-    """Integral over mean and log deviation of a normal likelihood with a random coefficient of `column`."""
-    n = len(y)
-    # The mean is taken out by contrasts, whose density does not depend on it.
-    contrasts = np.linalg.svd(np.ones((1, n)))[2][1:]
+def _marginal(y, column, size, covariance, line=()):
+    """Integral over mean, slope along a line and log deviation of a normal likelihood with a random
+    coefficient of `column`."""
+    usual = np.stack((np.ones(len(y)), *line))
+    n, p = len(y), len(usual)
+    # They are taken out by contrasts, whose density does not depend on them.
+    contrasts = np.linalg.svd(usual)[2][p:]
     turned = contrasts @ y
     moved = contrasts @ column
     spread = multivariate_normal(
-        np.zeros(n - 1), contrasts @ covariance @ contrasts.T + size**2 * np.outer(moved, moved)
+        np.zeros(n - p), contrasts @ covariance @ contrasts.T + size**2 * np.outer(moved, moved)
     )
 
     def density(log_deviation):
-        return spread.pdf(turned * np.exp(-log_deviation)) * np.exp(-(n - 1) * log_deviation)
+        return spread.pdf(turned * np.exp(-log_deviation)) * np.exp(-(n - p) * log_deviation)
 
-    return quad(density, -4.0, 5.0, limit=200, epsabs=0.0, epsrel=1e-7)[0]
+    volume = np.sqrt(np.linalg.det(usual @ usual.T))
+    return quad(density, -4.0, 12.0, limit=200, epsabs=0.0, epsrel=1e-7)[0] / volume
 
 
 @pytest.mark.parametrize("ages", [np.arange(8.0), np.array([0.0, 1.0, 3.0, 3.5, 8.0, 9.0, 15.0, 16.0])])
@@ -57,6 +60,45 @@ def test_the_statistic_is_the_sum_of_ratios_of_marginal_likelihoods(ages):
             plain = likelihood(step, 0.0)
             logs += [np.log(likelihood(step, 3.0) / plain), np.log(likelihood(ramp, 0.5) / plain)]
         assert chart.statistic[n - 1] == pytest.approx(np.sum(np.exp(logs)) / 2.0, rel=1e-6)
+
+
+def test_after_a_change_constants_and_lines_are_as_likely_from_the_first_runs_on():
+    t = np.array([0.0, 1.0, 2.0, 3.0, 4.5, 5.0, 6.5])
+    y = 0.3 * t + np.random.default_rng(3).normal(size=7)
+    prior = ChangePrior(sizes=(3.0,), ramp_sizes=(0.5,), wander=(0.0, 0.5))
+    told = FigureEvidence(y, t, 0, prior, None, moves=True)
+    told.go_to(6)
+    spread = [np.eye(7) + q * flicker_covariance(t, prior.longest_wander) for q in (0.0, 0.5)]
+
+    def likelihood(column, size):
+        total = 0.0
+        for line in ((), (t,)):
+            first = sum(_marginal(y[:4], column[:4], 0.0, c[:4, :4], [x[:4] for x in line]) for c in spread)
+            total += sum(_marginal(y, column, size, c, line) for c in spread) / first
+        return total
+
+    for place, onset in enumerate((4, 5)):
+        step = (np.arange(7) >= onset).astype(float)
+        ramp = np.where(np.arange(7) >= onset, t - t[onset - 1], 0.0)
+        ratios = [likelihood(step, 3.0), likelihood(ramp, 0.5)] / likelihood(step, 0.0) / 2.0
+        confirmed = np.where(told.logs[place] == 0.0, 1.0, ratios)
+        np.testing.assert_allclose(np.exp(told.logs[place]), confirmed, rtol=1e-6)
+    assert np.any(told.logs != 0.0)
+
+
+@pytest.mark.parametrize("slope", [0.5, 3.0, 30.0])
+def test_a_ramp_that_goes_on_is_one_alarm_and_its_end_another(slope):
+    age, late = np.arange(60.0), []
+    for seed in range(3):
+        level = np.random.default_rng([3, seed]).normal(size=60) + slope * np.clip(age - 15.0, 0.0, 25.0)
+        (first, *others) = change_chart({"level": level}, age, 300.0).changes
+        assert first.shape == "ramp" and not first.off_course
+        # Before, a new alarm every three runs.
+        assert len(others) <= 1
+        late += [(change.raised_at > 40, change.off_course, change.size) for change in others]
+    after, off_course, sizes = np.array(late).T
+    assert len(late) >= 2 and np.all(after) and np.all(off_course)
+    np.testing.assert_allclose(sizes, -slope, rtol=0.4)
 
 
 def test_outliers_of_single_runs_are_no_change_and_steps_are_found_with_the_next_run():

@@ -56,6 +56,21 @@ def test_the_order_of_arrival_makes_no_difference():
     assert "since 2026-03-13" in alarm_words(alarm)
 
 
+def test_a_drift_that_goes_on_says_so_and_its_end_is_told_off_its_course():
+    records = [
+        replace(record, level=record.level + 0.03 * min(max(day - 7, 0), 10))
+        for day, record in enumerate(service(30))
+    ]
+    (going,) = values_of(watch(records[:18]))["units"]
+    (alarm,) = going["alarms"]
+    assert "drifts by" in alarm_words(alarm) and "It goes on." in alarm_words(alarm)
+    (ended,) = values_of(watch(records))["units"]
+    first, last = ended["alarms"]
+    assert "goes on" not in alarm_words(first) and "off its course" not in alarm_words(first)
+    assert "off its course" in alarm_words(last)
+    assert last["size_ci90"][0] < -0.03 < last["size_ci90"][1]
+
+
 def test_units_are_kept_apart():
     units = watch([*service(unit="FOG-2"), *service(step_at=10, seed=1, unit="FOG-10")])
     assert [(u.unit, u.state) for u in units] == [("FOG-10", "alarm"), ("FOG-2", "steady")]
