@@ -36,12 +36,17 @@ class _OfAxis(Terminal):
     def __init__(self, terminal: Terminal, axis: str, staged: str, final: str) -> None:
         super().__init__(terminal.as_json, terminal.quiet)
         self.values: Any = None
+        self.written: list[str] = []
         self._names = staged, final
         self.say(f"Axis {axis}")
 
     def say(self, text: str) -> None:
-        """A line, with the folder's name as it will be."""
-        super().say(text.replace(*self._names))
+        """A line; one that names the folder is kept until that is there, with its name as it will be."""
+        staged, final = self._names
+        if staged != final and staged in text:
+            self.written.append(text.replace(staged, final))
+        else:
+            super().say(text)
 
     def result(self, values: Any) -> None:
         """Kept for the axes' one result."""
@@ -49,13 +54,14 @@ class _OfAxis(Terminal):
 
 
 def _each(settings: Settings, command: str, axes: tuple[str, ...], terminal: Terminal) -> bool:
-    values, met = {}, True
+    values, met, written = {}, True, list[str]()
     with _places(settings, command, axes) as places:
         for axis, (staged, final) in places.items():
             own = _for_axis(settings, axis, staged)
             printed = _OfAxis(terminal, axis, str(staged), str(final))
             met = load(own.job)(own, printed) is not False and met
             values[axis] = printed.values
+            written += printed.written
             if staged is not None and staged != final:
                 # The job wrote its settings with the folder's passing name.
                 _for_axis(settings, axis, final).write_into(staged, command)
@@ -67,7 +73,9 @@ def _each(settings: Settings, command: str, axes: tuple[str, ...], terminal: Ter
             page = axes_page(result, {axis: f"{axis}/{PAGES[command]}" for axis in axes})
             (staged.parent / "index.html").write_text(page, encoding="utf-8")
             settings.write_into(staged.parent, command)
-            terminal.say(f"Open {final.parent / 'index.html'}: the axes side by side")
+            written.append(f"Open {final.parent / 'index.html'}: the axes side by side")
+    for text in written:
+        terminal.say(text)
     terminal.result(result)
     return met
 

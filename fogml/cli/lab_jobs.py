@@ -75,8 +75,14 @@ def _print_rate(values: dict[str, Any], terminal: Terminal) -> None:
     terminal.say(" ".join(verdict_sentences(values)))
     synthetic = " (synthetic data)" if values["synthetic"] else ""
     terminal.show(result_table(values), f"{values['source']}: tests on a rate table{synthetic}")
+    _say_noticed(values, terminal)
+
+
+def _say_noticed(values: dict[str, Any], terminal: Terminal) -> None:
     for note in values["notes"]:
         terminal.say(note)
+    for finding in values.get("findings", ()):
+        terminal.say(f"{finding['run']}: {finding['message']}")
 
 
 def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:
@@ -140,5 +146,4 @@ def _print_north(values: dict[str, Any], terminal: Terminal) -> None:
     azimuths = [", ".join(f"{a:.2f}" for a in values[f"{k}_azimuth_deg"]) for k in ("quiet", "worst")]
     quiet, worst = (f"{told} deg" if told else "none" for told in azimuths)
     terminal.say(f"quiet azimuths {quiet}; worst {worst}")
-    for note in values["notes"]:
-        terminal.say(note)
+    _say_noticed(values, terminal)

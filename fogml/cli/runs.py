@@ -16,7 +16,7 @@ from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
-from fogml.runs.findings import DEAD, FIRST_OF_ALL
+from fogml.runs.findings import DEAD, FIRST_OF_ALL, Finding
 from fogml.runs.run import Run
 
 Check = Callable[[Sequence[Run]], None]
@@ -171,9 +171,14 @@ def note_wrong(first: Run, terminal: Terminal) -> None:
     """
     from fogml.runs.checks import check_run
 
-    for finding in check_run(first):
-        if finding.code in FIRST_OF_ALL and finding.code != DEAD:
-            terminal.note(f"{first.name}: {finding.message}")
+    note_findings(first.name, (finding for finding in check_run(first) if finding.code != DEAD), terminal)
+
+
+def note_findings(name: str, findings: Iterable[Finding], terminal: Terminal) -> None:
+    """Note on stderr those findings of a run that make every figure wrong."""
+    for finding in findings:
+        if finding.code in FIRST_OF_ALL:
+            terminal.note(f"{name}: {finding.message}")
 
 
 Values = dict[str, Any]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.cli.runs import open_run
+from fogml.cli.runs import note_findings, open_run
 from fogml.cli.terminal import Terminal
 from fogml.cli.twin_commands import ReplaySettings, SimulateSettings
 from fogml.errors import InputError
@@ -210,6 +210,7 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
     twin = None if elsewhere else load_twin(settings.twin)
     with terminal.work(f"reading {settings.run}") as work:
         run = open_run(settings.run, repair=settings.repair)
+        note_findings(run.name, run.findings, terminal)
         truth = read_truth(settings.truth) if settings.truth else None
         work.doing("replaying")
         if twin is None:

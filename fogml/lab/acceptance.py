@@ -15,8 +15,10 @@ from fogml.json_files import finite_json
 from fogml.lab.acceptance_figures import Figure, figures_of, small_rates, soak_table
 from fogml.lab.acceptance_rows import QUANTITIES, Limits
 from fogml.models.table import usable_rows
+from fogml.runs.findings import IMPLAUSIBLE
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S
+from fogml.validation.advice import Asked
 from fogml.validation.judge import judge_run
 from fogml.validation.results import RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors
@@ -61,8 +63,8 @@ def acceptance_json(
     -------
     dict
         Schema ``fogml.acceptance/1``. ``verdict`` is ``accepted``, ``rejected`` where a limit is missed,
-        ``incomplete`` where none is and one was not tested, an output stands still, or the model has seen a
-        run, and ``no_limits``.
+        ``incomplete`` where none is and one was not tested, an output stands still or saturates, or the
+        model has seen a run, and ``no_limits``.
 
     Raises
     ------
@@ -80,8 +82,11 @@ def acceptance_json(
     rows = [_row(one, figures.get(one.key), limits, model is not None) for one in QUANTITIES]
     seen = _seen(runs, model)
     still = [f"{one.run}: the output stands still: {one.still[0]}" for one in judged if one.still]
+    cut = [(one.run, one.saturated) for one in judged if one.saturated]
+    still += [f"{name}: {told}" for name, (told, share) in cut if share >= Asked().saturated]
     verdict, reasons = _verdict(rows, limits, seen, still)
-    notes = _of_earth(runs)
+    notes = [f"{run.name}: {one.message}" for run in runs for one in run.findings if one.code in IMPLAUSIBLE]
+    notes += _of_earth(runs)
     notes += [f"{name}: the model was trained on this run" for name in seen]
     notes += _left_out(errors) + _near(rows, limits)
     small = {run.name for run in runs if small_rates(run)}

@@ -188,7 +188,9 @@ def errors_of(
     sines = np.sin(np.radians(region.outline_deg))
     angles = np.degrees(np.arcsin(np.minimum(np.hypot(sines[:, 0], sines[:, 1]), 1.0)))
     inside = _holds_zero(values[1:3], covariance[1:3, 1:3], dof)
-    intervals["delta_deg"] = (0.0 if inside else float(angles.min()), float(angles.max()))
+    low, high = 0.0 if inside else float(angles.min()), float(angles.max())
+    # An axis that points down is as far from the reference axis turned round.
+    intervals["delta_deg"] = (180.0 - high, 180.0 - low) if values[3] > 90.0 else (low, high)
     se: dict[str, float | list[float]] = {n: float(sd[i]) for i, n in enumerate(names)}
     gradient_free = inside or sd[3] == 0.0
     se["delta_deg"] = float(np.hypot(sd[1], sd[2]) / np.sqrt(2.0)) if gradient_free else float(sd[3])

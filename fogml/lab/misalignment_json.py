@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from fogml.errors import InputError
-from fogml.lab.misalignment import TableMeasurements, decouple, fit_state
+from fogml.errors import InputError, counted
+from fogml.lab.misalignment import Misalignment, TableMeasurements, decouple, fit_state
 from fogml.lab.misalignment_errors import LEVEL
 from fogml.lab.misalignment_states import STATES
+from fogml.numerals import percent, short
 
 _SAME_TILT_DEG = 0.05
+_PER_DEG_H = {"deg/h": 1.0, "deg/s": 3600.0, "rad/s": 3600.0 * 180.0 / np.pi}
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,47 @@ def relative_error_ppm(found: float | None, true: float) -> float | None:
     return None if found is None else 1e6 * (found / true - 1.0)
 
 
+def _doubts(
+    measured: TableMeasurements, found: Misalignment, *, most_off: float = 0.01, far: float = 0.5
+) -> list[str]:
+    """What the turns show that is no scale factor's.
+
+    Parameters
+    ----------
+    measured, found
+        Turns, and what they gave.
+    most_off
+        Share of the greatest output by which a turn may miss what all show: the error that ends a gyro's
+        range.
+    far
+        Share by which no gyro misses the scale factor of the unit that its output is stated in.
+    """
+    doubts = []
+    expected = 3600.0 / _PER_DEG_H.get(measured.unit, np.nan)
+    if abs(found.K / expected - 1.0) > far:
+        doubts.append(
+            f"K is {short(found.K, 4)} where an output in {measured.unit} shows about {short(expected, 4)}: "
+            "is its unit stated wrongly?"
+        )
+    along = {fit.state: fit.coefficients for fit in found.states}
+    c = np.array([np.append(along[int(state)], 0.0)[:3] for state in measured.state])
+    tilt = np.radians(measured.tilt_deg)
+    shown = measured.rate_deg_s * (c[:, 0] * np.cos(tilt) + c[:, 1] * np.sin(tilt) + c[:, 2])
+    off = np.abs(measured.output - shown) / np.abs(shown).max()
+    worst, count = int(np.argmax(off)), int(np.count_nonzero(off > most_off))
+    if count:
+        more = (
+            "" if count == 1 else f", as do {counted(count - 1, 'other turn')} by over {percent(most_off, 0)}"
+        )
+        doubts.append(
+            f"the output of the turn at {measured.rate_deg_s[worst]:g} deg/s in state "
+            f"{measured.state[worst]:g}, tilt {measured.tilt_deg[worst]:g} deg misses what all turns show by "
+            f"{percent(off[worst], 0)} of the greatest{more}: does the output saturate, or was a turn not as "
+            "stated?"
+        )
+    return doubts
+
+
 SCHEMA = "fogml.misalignment/1"
 
 
@@ -170,5 +213,5 @@ def misalignment_json(measured: TableMeasurements, cross_tilt: bool | None = Non
             {**asdict(method), "K_difference_ppm": relative_error_ppm(method.K, found.K)}
             for method in compare_methods(measured, found.cross_tilt)
         ],
-        "notes": list(found.notes),
+        "notes": [*_doubts(measured, found), *found.notes],
     }

@@ -21,6 +21,8 @@ from fogml.lab.north_schemes import (
     ways_of_equal_time,
     wrapped,
 )
+from fogml.runs.checks import refuse_dead
+from fogml.runs.findings import of_any_use
 from fogml.runs.run import Run
 
 SCHEMA = "fogml.north/1"
@@ -41,6 +43,7 @@ def recorded_north_json(
     latitude_deg: float | None = None,
 ) -> dict[str, Any]:
     """North from a recorded run, schema ``fogml.north/1``; see :func:`north_from_positions`."""
+    refuse_dead([run])
     fix = north_from_positions(
         run, sense=sense, order_deg=order_deg, method=method, settle_s=settle_s, latitude_deg=latitude_deg
     )
@@ -77,8 +80,7 @@ def recorded_north_json(
         ],
         "errors_by_azimuth": _circle(error) if fix.method != "plain" else None,
         "notes": list(fix.notes),
-        # A column that no drift model uses is the very one that this procedure needs.
-        "findings": [f.as_dict() for f in run.findings if f.code != "unknown_column"],
+        "findings": of_any_use(run.name, run.findings),
     }
 
 

@@ -28,6 +28,7 @@ from fogml.lab.rate_tests import (
     zero_answers,
 )
 from fogml.numerals import short
+from fogml.runs.findings import of_any_use
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.twin.coil import LayeredCoil, lead_sensitivity, midpoint_sensitivity, radial_sensitivity
@@ -133,7 +134,8 @@ def rate_json(
         "unit": None if twin is None else unit_facts(twin),
     }
     told = () if twin is None else twin.notes
-    return values | {"notes": [*told, *doubts, *_notes(values)]}
+    found = [finding for run in runs for finding in of_any_use(run.name, run.findings)]
+    return values | {"notes": [*told, *doubts, *_notes(values)], "findings": found}
 
 
 def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
@@ -16,7 +17,8 @@ from fogml.models.base import DriftModel, Evaluation
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
 from fogml.monitor.figures import Averages, run_figures
-from fogml.runs.findings import dead_words
+from fogml.runs.checks import spoiling
+from fogml.runs.findings import OF_OUTPUT, OF_TEMPERATURE, SPOILING, Finding, dead_words
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.runs.transitions import transition_mask
@@ -116,7 +118,12 @@ NUMBERS = tuple(f.name for f in fields(RunRecord) if f.type == "float")
 
 
 def record_run(
-    model: DriftModel, blocks: Iterable[Run], *, averaging_s: float = AVERAGING_S, any_unit: bool = False
+    model: DriftModel,
+    blocks: Iterable[Run],
+    *,
+    averaging_s: float = AVERAGING_S,
+    any_unit: bool = False,
+    most_spoilt: float = 0.01,
 ) -> RunRecord:
     """What a model leaves on a run that comes in blocks.
 
@@ -130,12 +137,16 @@ def record_run(
         Averaging time of the figures [s].
     any_unit
         Allow a run of another unit or axis than the model's.
+    most_spoilt
+        Share of the samples that may be stuck, or at the ends of the output's range at rest: what fewer do
+        lies within the noise of an average.
 
     Raises
     ------
     InputError
         If the run is empty, of another unit or axis, does not state the attitude that tells Earth rate while
-        the model knows it, holds fewer than `LEAST_WINDOWS` averages, or one value in every sample.
+        the model knows it, holds fewer than `LEAST_WINDOWS` averages, one value in every sample,
+        more spoilt samples than `most_spoilt`, or numbers that can't be what the run states of its output.
     """
     recording = _Recording(model, averaging_s)
     for block, evaluation in evaluate_blocks(model, blocks, any_unit=any_unit):
@@ -147,6 +158,7 @@ def record_run(
         raise InputError(f"{first.name}: {dead_words(recording.low)}; it is not kept, record it again")
     time, mean = recording.means.values()
     used, is_inside = _used(mean, first.name, averaging_s)
+    recording.hold_usable(is_inside, most_spoilt)
     half = mean["half"][used]
     told = run_figures(
         Averages(
@@ -194,6 +206,7 @@ class _Recording:
         self.samples = self.outside = 0
         self.last_s = 0.0
         self.low, self.high = np.inf, -np.inf
+        self.spoilt: list[Finding] = []
 
     def add(self, block: Run, evaluation: Evaluation) -> None:
         """Add a block and what the model tells of it."""
@@ -223,8 +236,23 @@ class _Recording:
         )
         self.samples += len(block)
         self.low, self.high = min(self.low, float(block.gyro.min())), max(self.high, float(block.gyro.max()))
+        self.spoilt += spoiling(block)
         self.outside += int(np.count_nonzero(evaluation.outside & evaluation.full))
         self.last_s = float(block.time[-1])
+
+    def hold_usable(self, is_inside: bool, most_spoilt: float) -> None:
+        """Refuse a recording whose output is not the gyro's, or not what it is stated to be.
+
+        A temperature that can't be is refused where it lies outside training: else the model bears it out.
+        """
+        assert self.first is not None
+        counts: Counter[str] = Counter()
+        for finding in self.spoilt:
+            wrong = finding.code in OF_OUTPUT or (finding.code in OF_TEMPERATURE and not is_inside)
+            if finding.code in SPOILING:
+                counts[finding.code] += finding.count if finding.at_rest is None else finding.at_rest
+            if wrong or counts[finding.code] > most_spoilt * self.samples:
+                raise InputError(f"{self.first.name}: {finding.message}; until that is right it is not kept")
 
     def key(self, sha: str) -> str:
         """Digest of the recording, its unit and the model's `sha`."""

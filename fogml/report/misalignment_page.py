@@ -70,6 +70,14 @@ def _within(se: float | None, unit: str) -> str:
     return "no standard error" if se is None else f"± {number(se)} {unit} (standard error)"
 
 
+def _span(low: float, high: float) -> str:
+    """An interval with so many digits that its ends differ."""
+    digits = 7
+    while digits < 10 and low != high and number(low, digits) == number(high, digits):
+        digits += 1
+    return f"{number(low, digits)} … {number(high, digits)}"
+
+
 def result_table(values: Mapping[str, Any]) -> Table:
     """Scale factor, misalignment and the fixture's zero errors, with standard errors and intervals."""
     se, intervals = values["se"], values["intervals"]
@@ -81,7 +89,7 @@ def result_table(values: Mapping[str, Any]) -> Table:
         ("Misalignment, whole", "delta_deg", "deg"),
     ):
         ends = intervals.get(key)
-        span = f"{number(ends[0], 7)} … {number(ends[1], 7)}" if ends else MISSING
+        span = MISSING if ends is None else _span(*ends)
         rows.append((label, number(values[key], 8), number(se.get(key)), span, unit))
     errors = se.get("fixture_error_deg") or [None, None]
     for axis, value, error in zip("xy", values["fixture_error_deg"], errors):

@@ -80,6 +80,8 @@ def calibration_words(unit: Mapping[str, Any]) -> str:
             return f"Too few runs to foretell when {beyond}: no trend is seen in {_days(span)}."
         soonest = "100 years" if earliest is None else _days(earliest)
         return f"No trend is seen: not before {soonest} (95 %) will it be that {beyond}."
+    if latest == 0.0:
+        return f"Calibrate now: by the line through its runs {beyond}."
     return f"Calibrate again in {_days(due)} (90 %: {_days(earliest)} to {_days(latest)}), when {beyond}."
 
 

@@ -13,7 +13,7 @@ from fogml.numerals import number, stated, unit_words
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import Tile, render
-from fogml.report.tables import Table
+from fogml.report.tables import Table, noticed
 
 
 def rate_page(values: Mapping[str, Any]) -> str:
@@ -32,6 +32,7 @@ def rate_page(values: Mapping[str, Any]) -> str:
         ],
         about=_about(values),
         unit=_unit(values["unit"]),
+        findings=noticed(values.get("findings", ())),
     )
 
 

@@ -246,5 +246,6 @@ def noticed(findings: Iterable[Finding | Mapping[str, Any]]) -> list[Noticed]:
         place = [f"column {values['column']}"] if values.get("column") else []
         place += [f"from row {values['row']}"] if values.get("row") else []
         message = str(values["message"])
+        message = f"{values['run']}: {message}" if values.get("run") else message
         shown.append(Noticed(str(values["code"]), message[:1].upper() + message[1:], ", ".join(place)))
     return shown

@@ -59,7 +59,7 @@ def runs_of_table(
     findings = [*table.findings, *notes]
     return runs_of_columns(
         columns,
-        Rows(table.file, table.row_name),
+        Rows(table.file, table.row_name, table.called),
         _facts(table, path),
         name or path.name,
         gyro_unit=gyro_unit,
@@ -200,7 +200,7 @@ class Assembler:
             For every fault, also for time that goes back or repeats from one block to the next.
         """
         columns, gyro_unit, tick_s, findings = _internal_columns(table)
-        rows, named = np.arange(len(table), dtype=np.intp), Rows(table.file, table.row_name)
+        rows, named = np.arange(len(table), dtype=np.intp), Rows(table.file, table.row_name, table.called)
         finite_rows(named, columns, rows, repair=False)
         time = columns["time"]
         ordered = in_order(time, columns, tick_s=tick_s, row_name=table.row_name) if len(time) else None

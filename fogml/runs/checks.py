@@ -9,36 +9,27 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.arrays import BoolArray
 from fogml.errors import InputError, counted
 from fogml.numerals import short
-from fogml.runs.findings import DEAD, Finding, dead_words
+from fogml.runs.findings import DEAD, SATURATION, Finding, dead_words
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
 from fogml.runs.run import Run
+from fogml.runs.stuck import stuck
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.runs.thermometers import coarse, resolution, spiked
+from fogml.runs.turning import turning
 from fogml.signals import large
 
-STUCK_S = 600.0
-"""A sensor that shows one value for longer [s] may be stuck."""
-MOVED_DEGC = 0.5
-"""What another sensor must have moved by meanwhile [degC], at least."""
-FROZEN_SAMPLES = 60
-"""Samples of one value, one after the other, from which on a noisy output may be frozen."""
-FROZEN_RATIO = 10
-"""How many times longer that is than any other value stays, those that are frozen apart."""
 SATURATED_SAMPLES = 3
 """Samples at an extreme, one after the other, from which on the output may saturate."""
 SATURATED_IN_ALL = 10
 """Samples at an extreme in all: noise that reaches beyond it now and then is cut off one by one."""
 SMALL_SPAN_DEGC = 5.0
 """A temperature span under this [degC] is small."""
-_MARK_SHARE = 0.49
 _IRREGULAR_SHARE = 0.01
 _IRREGULAR_INTERVAL = 0.1
-_LEAST_SPELLS = 100
-_NOISY_SPELL = 2
 _LEAST_STEPS = 8
 _TAIL_RATIO = 3
 _RESTING_SAMPLES = 10
@@ -61,7 +52,8 @@ def check_run(run: Run) -> tuple[Finding, ...]:
     ``stuck_sensor``
         A temperature holds one value for over 10 min while another moves by more than 0.5 degC
         and more than twice the sensor's resolution; or the gyro does, whose samples else differ,
-        or holds one for 60 samples and ten times as long as it does else, no table turning.
+        or holds one for 60 samples and ten times as long as it does else, no table turning, or for 60
+        samples while the table's rate changes.
     ``dead_output``
         The gyro has one value in every sample.
     ``saturation``
@@ -82,7 +74,7 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         coarse,
         _gaps,
         _irregular,
-        _stuck,
+        stuck,
         _dead,
         _saturated,
         _outliers,
@@ -94,6 +86,15 @@ def check_run(run: Run) -> tuple[Finding, ...]:
             found += part(run)
             large.release()
     return tuple(found)
+
+
+def spoiling(run: Run) -> Iterator[Finding]:
+    """Of `check_run` what makes an output's figures wrong: what can't be, spells of one value, saturation."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        yield from implausible(run)
+        yield from (finding for finding in stuck(run) if finding.column == "gyro")
+        yield from _dead(run)
+        yield from _saturated(run)
 
 
 def refuse_dead(runs: Iterable[Run]) -> None:
@@ -149,100 +150,6 @@ def _irregular(run: Run) -> Iterator[Finding]:
         yield Finding("irregular_sampling", message, column="time", row=first, count=count)
 
 
-def _stuck(run: Run) -> Iterator[Finding]:
-    temperatures = run.temperature_columns
-    marks = _marks(run.time)
-    for name in (*temperatures, "gyro"):
-        values = run.columns[name]
-        if marks is not None and not _stays(values, marks):
-            continue
-        starts, stops, total = _long_spells(run.time, values)
-        if not len(starts):
-            continue
-        least = max(MOVED_DEGC, 2.0 * resolution(values)) if name != "gyro" else MOVED_DEGC
-        if name == "gyro":
-            # A quiet output of few steps rests at one value for long; a noisy one hardly ever.
-            spells = total - len(starts)
-            samples = len(values) - int((stops - starts).sum())
-            if spells < _LEAST_SPELLS or samples > _NOISY_SPELL * spells:
-                continue
-        others = [run.temperature(other) for other in temperatures if other != name]
-        found = [
-            i for i, (a, b) in enumerate(zip(starts, stops)) if any(np.ptp(x[a:b]) > least for x in others)
-        ]
-        if found:
-            first, last = int(starts[found[0]]), int(stops[found[0]]) - 1
-            times = "" if len(found) == 1 else f", and {len(found) - 1} times more,"
-            message = (
-                f"'{name}' stays at {values[first]:.6g} from {run.time[first]:.10g} s to "
-                f"{run.time[last]:.10g} s{times} while a temperature moves; the sensor may be stuck"
-            )
-            count = int((stops - starts)[found].sum())
-            yield Finding("stuck_sensor", message, column=name, row=first + 1, count=count)
-            if name == "gyro":
-                return
-    yield from _frozen(run)
-
-
-def _frozen(run: Run) -> Iterator[Finding]:
-    """Spells of the gyro that a noisy output makes by no chance, however short or steady the run."""
-    gyro, half = run.gyro, FROZEN_SAMPLES // 2
-    if "rate" in run.columns and np.ptp(run.columns["rate"]) > 0.0:
-        return  # coarse counts rest at one value while the table stands
-    same = gyro[1:] == gyro[:-1]
-    if len(same) < FROZEN_SAMPLES or not same[: len(same) // half * half].reshape(-1, half).all(axis=1).any():
-        return
-    true = np.flatnonzero(same)
-    edges = np.flatnonzero(np.diff(true) > 1)
-    lengths = np.diff(edges, prepend=-1, append=len(true) - 1) + 1
-    ordinary = int(np.max(lengths, where=lengths < FROZEN_SAMPLES, initial=1))
-    found = np.flatnonzero(lengths >= max(FROZEN_SAMPLES, FROZEN_RATIO * ordinary))
-    count = int(lengths[found].sum())
-    others = len(same) - len(true) + 1 - len(found)
-    if len(found) and others >= _LEAST_SPELLS and len(gyro) - count <= _NOISY_SPELL * others:
-        first = int(true[np.concatenate(([0], edges + 1))[found[0]]])
-        spells = "" if len(found) == 1 else f", and {len(found) - 1} times more"
-        message = (
-            f"'gyro' stays at {gyro[first]:.6g} for {lengths[found[0]]} samples from {run.time[first]:.10g} "
-            f"s on{spells}, where else no value lasts longer than {ordinary}; the output may be stuck"
-        )
-        yield Finding("stuck_sensor", message, column="gyro", row=first + 1, count=count)
-
-
-def _marks(time: FloatArray) -> IndexArray | None:
-    """First samples at or after marks so near that a spell of a stuck value holds two; None at long gaps."""
-    apart_s = _MARK_SHARE * STUCK_S
-    if time[-1] - time[0] > apart_s * len(time):
-        return None
-    marks = np.searchsorted(time, np.arange(time[0], time[-1], apart_s))
-    return marks if np.all(marks[1:] > marks[:-1]) else None
-
-
-def _stays(values: FloatArray, marks: IndexArray) -> bool:
-    """Whether a column holds one value from any mark to the next."""
-    if len(marks) < 2:
-        return False
-    large.release()
-    same = values[1 : marks[-1] + 1] == values[: marks[-1]]
-    return bool(np.logical_and.reduceat(same, marks[:-1]).any())
-
-
-def _long_spells(time: FloatArray, values: FloatArray) -> tuple[IndexArray, IndexArray, int]:
-    """Spells [start, stop) of one value that last long, and how many there are of any length."""
-    kept, total, begin = [], 1, 0
-    for part in large.pieces(values, overlap=1):
-        changes = part.start + 1 + np.flatnonzero(values[part][1:] != values[part][:-1])
-        total += len(changes)
-        # The last spell of a part may go on in the next one.
-        edges = np.concatenate([[begin], changes, [len(values)] if part.stop == len(values) else []])
-        edges = edges.astype(np.intp)
-        spells = np.column_stack((edges[:-1], edges[1:]))
-        kept.append(spells[time[spells[:, 1] - 1] - time[spells[:, 0]] > STUCK_S])
-        begin = int(edges[-1])
-    starts, stops = np.concatenate(kept).T
-    return starts, stops, total
-
-
 def _dead(run: Run) -> Iterator[Finding]:
     least, greatest = large.extremes(run.gyro)
     if greatest == least:
@@ -276,7 +183,9 @@ def _saturated(run: Run) -> Iterator[Finding]:
         rests = usual >= _RESTING_SAMPLES and spell < _RESTING_RATIO * usual
         if not is_tail and not rests:
             message = f"{count} samples of 'gyro' at its extreme of {extreme:.6g}; the output may saturate"
-            yield Finding("saturation", message, column="gyro", row=int(np.argmax(at)) + 1, count=count)
+            at_rest = int(np.count_nonzero(at & ~turning(run)))
+            row = int(np.argmax(at)) + 1
+            yield Finding(SATURATION, message, column="gyro", row=row, count=count, at_rest=at_rest)
 
 
 def _may_saturate(at: BoolArray) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -101,6 +101,9 @@ def noise_report(
     moving: dict[str, float] = {}
     for one in moves:
         moving |= one
+    unread = dict.fromkeys(("K", "R"), "not read from a run with moving temperature") if moving else {}
+    if any(len(set(large.extremes(one.gyro))) == 1 for one in runs):
+        unread = dict.fromkeys("QNBKR", "not read from an output that stands still")
     spectrum = spectrum_of_runs(series, [bool(one) for one in moves])
     terms = noise_terms(spectrum, whole, LEVEL, least_tau_s=first.new_s, ramps=len(series))
     alone = [_alone(one, bool(m)) for one, m in zip(series, moves)] if len(series) > 1 else []
@@ -134,11 +137,11 @@ def noise_report(
         "n": listed.n.tolist(),
         "edf": listed.edf.tolist(),
         "noise": [NOISE_NAMES[exponent] for exponent in listed.exponent.tolist()],
-        "terms": _terms(terms, moving),
+        "terms": _terms(terms, unread),
         **model_told(terms, listed.taus_s, first),
         "stationarity": None if steady is None else asdict(steady),
         "minimum": {"adev": terms.minimum_adev, "tau_s": float(f"{terms.minimum_tau_s:.9g}")},
-        "runs": [{"run": one.run.name, "terms": _terms(told, moving)} for one, told in zip(series, alone)],
+        "runs": [{"run": one.run.name, "terms": _terms(told, unread)} for one, told in zip(series, alone)],
         "warnings": warnings,
         "findings": [finding.as_dict() for one in runs for finding in one.findings],
         "notes": [*notes, *words_of(terms, first, runs), *(warning["message"] for warning in warnings)],
@@ -177,16 +180,16 @@ def moving_temperatures(run: Run) -> dict[str, float]:
     return {name: span for name, span in spans.items() if span > MOVING_DEGC}
 
 
-def _terms(found: NoiseTerms, moving: dict[str, float]) -> dict[str, dict[str, Any]]:
+def _terms(found: NoiseTerms, unread: Mapping[str, str]) -> dict[str, dict[str, Any]]:
     terms: dict[str, dict[str, Any]] = {}
     for name, term in found.terms.items():
-        if moving and name in ("K", "R"):
+        if name in unread:
             terms[name] = {
                 "value": None,
                 "ci": [None, None],
                 "unit": term.unit,
                 "fitted": None,
-                "reason": "not read from a run with moving temperature",
+                "reason": unread[name],
             }
             continue
         terms[name] = {

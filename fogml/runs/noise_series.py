@@ -125,9 +125,11 @@ class NoiseSeries:
 def series_of(run: Run) -> NoiseSeries:
     segments = stretches_at_rest(run)
     if max((part.stop - part.start for part in segments), default=0) < 3:
+        turns = int(np.count_nonzero(~rows_at_rest(run)))
+        why = f", and the table turns at {turns} of {len(run)}" if turns else ""
         raise InputError(
             f"{run.name}: too short for an Allan deviation: at least 3 samples without a gap are "
-            "needed; give a longer run"
+            f"needed{why}; give a longer run{' at rest' if turns else ''}"
         )
     sample_s = sample_interval(run, segments)
     error = run.error_deg_h

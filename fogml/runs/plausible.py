@@ -17,6 +17,7 @@ from fogml.numerals import short
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
 from fogml.runs.turning import turning
+from fogml.runs.unrecorded_turns import implausible_rest
 from fogml.signals import large
 
 HOUR_S = 3600.0
@@ -68,10 +69,13 @@ FASTEST_DEGC_PER_MIN = 60.0
 """No chamber takes a gyro faster over `FAR_DEGC`: air of shock chambers changes by up to 50 degC/min."""
 FAR_DEGC = 10.0
 """A thermometer's noise and a bad contact move means of parts of a run by less than this [degC]."""
+SLOWEST_DEGC_PER_MIN = 0.0015
+"""A temperature that moves by `FAR_DEGC` is faster at times [degC/min]: weather moves by 2 degC a day."""
 SPREADSHEET_DAYS = (36526.0, 73050.0)
 """Days as spreadsheets count them, of the years 2000 to 2099."""
 DAY_S = 86400.0
 _PARTS = 64  # of a run, whose means noise moves little, and which a ramp of a chamber still spans
+_PART_S = 6.0 * HOUR_S  # ... and none longer than a day's ups and downs
 _ENDS = (0.02, 0.98)
 Ends = tuple[float, float]
 
@@ -86,12 +90,14 @@ def implausible(run: Run) -> Iterator[Finding]:
     ``thermometers_apart``
         The means of two thermometers differ by more than 80 degC.
     ``implausible_clock``
-        A temperature moves faster than any chamber takes a gyro, or the times of a fast logger are those of
-        a spreadsheet's days.
+        A temperature moves faster than any chamber takes a gyro, or slower than the weather; or the times
+        of a fast logger are those of a spreadsheet's days.
     ``implausible_earth_rate``
         Earth rate is known, and the mean at rest is that with the other sign, or in another unit.
     ``implausible_scale_factor``
         The output follows the table rate with the other sign, or in another unit.
+    ``implausible_rest``
+        What the output does where no table rate is recorded, no bias does (`implausible_rest`).
     """
     yield from _compensated(run)
     told = {name: _unit_told(run.columns[name]) for name in run.temperature_columns}
@@ -109,6 +115,7 @@ def implausible(run: Run) -> Iterator[Finding]:
         return  # counts whose scale factor is not stated
     yield from _scale_factor(run, gyro)
     yield from _earth_rate(run, gyro)
+    yield from implausible_rest(run, gyro)
 
 
 def compensated_by(run: Run) -> str | None:
@@ -207,7 +214,8 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
         )
         yield Finding("implausible_clock", told, column="time", count=len(run))
         return
-    edges = np.linspace(0, len(run), min(_PARTS, len(run) // 2) + 1).astype(int)
+    parts = min(max(_PARTS, int(run.span_s / _PART_S)), len(run) // 2)
+    edges = np.linspace(0, len(run), parts + 1).astype(int)
     spans = list(pairwise(edges))
     middle = np.array([time[a:b].mean() for a, b in spans])
     for name in names:
@@ -219,6 +227,16 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
                 f"'{name}' moves by {short(moved[fast].sum())} degC in {short(within_s[fast].sum())} s in "
                 "all, faster than a chamber takes a gyro: is the clock in minutes, hours or days? Write its "
                 "header as 'time [min]', 'time [h]' or 'time [d]'"
+            )
+            yield Finding("implausible_clock", told, column="time", count=len(run))
+            return
+        fastest = float(np.max(moved / within_s, initial=0.0)) * 60.0
+        if np.ptp(means) >= FAR_DEGC and fastest < SLOWEST_DEGC_PER_MIN:
+            told = (
+                f"'{name}' moves by {short(np.ptp(means))} degC, but never faster than {short(fastest, 2)} "
+                "degC/min, slower than chamber and weather: is the clock in a shorter unit, as ms or us? "
+                f"Correct its header, as in 'time [ms]'; if samples are {short(run.sample_s)} s apart, "
+                "nothing is to be done"
             )
             yield Finding("implausible_clock", told, column="time", count=len(run))
             return

@@ -188,6 +188,19 @@ class Rows(NamedTuple):
 
     file: str
     row_name: Callable[[int], str]
+    called: Mapping[str, str] = {}
+
+    def fault(self, name: str, row: int, values: FloatArray, found: BoolArray, cure: str) -> str:
+        """What to say of faulty values, the first of them in a row by its number, and how to mend them."""
+        if found.all():
+            needed = name in ("time", "gyro")
+            cure = "correct them" if needed else "leave the column out where it was not recorded"
+        no_other = ", and no other" if found.all() else ""
+        return (
+            f"{self.file}, column '{self.called.get(name, name)}', {self.row_name(row)}: the value is "
+            f"{fault_of(values[np.argmax(found)])}, {int(found.sum())} such in the column{no_other}; "
+            f"{cure}"
+        )
 
 
 def finite_rows(
@@ -199,13 +212,9 @@ def finite_rows(
         found = faulty(name, values)
         if found is None:
             continue
-        if not repair:
-            row = int(np.argmax(found))
-            raise InputError(
-                f"{table.file}, column '{name}', {table.row_name(int(rows[row]))}: the value is "
-                f"{fault_of(values[row])}, {int(found.sum())} such in the column; correct them, or {REPAIR} "
-                "drops the rows"
-            )
+        if not repair or (len(found) and found.all()):
+            cure = f"correct them, or {REPAIR} drops the rows"
+            raise InputError(table.fault(name, int(rows[np.argmax(found)]), values, found, cure))
         bad = found if bad is None else bad | found
     if bad is None:
         return rows, None

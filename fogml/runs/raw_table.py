@@ -191,6 +191,8 @@ class RawTable:
         What was noticed so far.
     started
         When the clock was 0, where the file's times are dates.
+    called
+        What the file calls a column that is another's here, as ``gyro_y`` for ``gyro``.
     """
 
     file: str
@@ -200,6 +202,7 @@ class RawTable:
     row_name: Callable[[int], str] = numbered_row
     findings: tuple[Finding, ...] = field(default=())
     started: datetime | None = None
+    called: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()))) if self.columns else 0

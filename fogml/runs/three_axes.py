@@ -101,7 +101,8 @@ class OneAxis:
             if name not in left_out
         }
         columns = {cells[cell]: values for cell, values in table.columns.items() if cell in cells}
-        return replace(table, cells=tuple(cells.values()), columns=columns)
+        called = {name: other for other, name in own.items() if other in names.values()}
+        return replace(table, cells=tuple(cells.values()), columns=columns, called=called)
 
     def run(self, run: Run) -> Run:
         """A run of that table with the facts of its axis.

@@ -148,7 +148,10 @@ class Inputs:
         if name == "T_leads" and self.temperatures:
             return np.asarray(sum(weight * self.temperature(end) for end, weight in LEADS.items()))
         held = ", ".join(self.temperatures) or "none"
-        raise InputError(f"no temperature '{name}' is recorded or given by the plant; there is {held}")
+        raise InputError(
+            f"no temperature '{name}' is recorded or given by the plant; there is {held}: call the column "
+            "that measures it so, or 'T [degC]' where there is one alone"
+        )
 
     def readings(self, name: str = "T") -> Sequence[FloatArray]:
         """The readings that `temperature` is the mean of, shape (n,) each [degC]."""

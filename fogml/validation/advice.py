@@ -16,6 +16,7 @@ from fogml.validation.reasons import (
     Reason,
     gained_reasons,
     implausible_reasons,
+    saturated_reason,
     still_reason,
     unit_reasons,
 )
@@ -39,6 +40,9 @@ class Asked:
         does not take away what it should there, it is not to be used.
     mostly_still
         Share of a run's samples at which the output stands still, from which on the run says nothing: half.
+    saturated
+        Share of a run's samples at the ends of the output's range at rest, from which on care is due: what
+        fewer are cut off by moves its averages by less than their noise.
     beside
         Share of the rms on the worst test run by which a model judged beside has to leave less before it is
         named instead: two fits of one unit differ by as much from run to run.
@@ -50,6 +54,7 @@ class Asked:
     outside: float = 0.01
     mostly_outside: float = 0.5
     mostly_still: float = 0.5
+    saturated: float = 0.01
     beside: float = 0.05
     coverage: float = 0.8
 
@@ -135,6 +140,8 @@ def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
         for run in runs:
             if (still := still_reason(run, asked.mostly_still, what)) is not None:
                 yield still
+            if (cut := saturated_reason(run, asked.saturated, asked.mostly_still, what)) is not None:
+                yield cut
             yield from implausible_reasons(run)
     yield from unit_reasons(judgement.train, judgement.test)
     yield from _not_judged(judgement)

@@ -90,7 +90,10 @@ def _model(
         segments = np.array(list(pairwise(edges.tolist())), dtype=np.int64).reshape(-1, 2)
         long = segments[:, 1] - segments[:, 0] >= 3
         if not np.any(long):
-            raise InputError(f"{run.name}: no three samples in a row count; a noise floor needs more")
+            raise InputError(
+                f"{run.name}: no three samples in a row count, as those at which the table turns or "
+                "a thermometer fails do not; a noise floor needs more: give a run that rests longer"
+            )
         starts, stops = segments[long].T
         moves = bool(moving_temperatures(run))
         large.release()

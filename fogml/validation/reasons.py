@@ -40,6 +40,20 @@ def still_reason(run: RunJudgement, mostly_still: float, what: str) -> Reason | 
     )
 
 
+def saturated_reason(run: RunJudgement, least: float, mostly: float, what: str) -> Reason | None:
+    """What speaks against a model where at least so many of the output's samples are at its range's ends."""
+    if run.saturated is None or run.saturated[1] < least:
+        return None
+    told, share = run.saturated
+    return Reason(
+        "do_not_use" if share > mostly else "use_with_care",
+        f"the output of {run.run} saturates",
+        f"{run.run}: {told}. At {percent(share, 0)} of the samples it is at the end of its range: what is "
+        f"{what} there is the range, not the gyro.",
+        f"Record {run.run} again with a range that holds the output, or leave these rows out.",
+    )
+
+
 def implausible_reasons(run: RunJudgement) -> Iterator[Reason]:
     """What speaks against a model where the numbers of a run can't be what they are stated to be."""
     for finding in run.findings:

@@ -13,7 +13,7 @@ from fogml.arrays import FloatArray
 from fogml.numerals import short
 from fogml.pictures import AFTER, BEFORE, Panel, Pictured, in_time
 from fogml.runs.facts import Facts
-from fogml.runs.findings import Finding, standstill
+from fogml.runs.findings import Finding, saturated, standstill
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,16 @@ class RunJudgement:
         found = standstill(self.findings)
         if found is None:
             return None
-        return found.message, found.count / max(self.rows_used + self.rows_left_out, found.count)
+        return found.message, self._share(found.count)
+
+    @property
+    def saturated(self) -> tuple[str, float] | None:
+        """What is said of an output at its range's ends at rest, and the share of the samples; else None."""
+        found = saturated(self.findings)
+        return None if found is None else (found[0], self._share(found[1]))
+
+    def _share(self, samples: int) -> float:
+        return samples / max(self.rows_used + self.rows_left_out, samples)
 
 
 @dataclass(frozen=True)

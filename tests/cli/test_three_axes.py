@@ -161,3 +161,14 @@ def test_a_fleet_takes_the_axis_that_its_manifest_names(home, tmp_path):
     UnitWork({"model": "mean", "averaging": 100.0}, FORM)(unit, tmp_path / "z")
     report = json.loads((tmp_path / "z" / "report.json").read_text())
     assert [run["axis"] for run in (*report["train"], *report["test"])] == ["z", "z"]
+
+
+def test_nothing_is_said_to_be_written_where_an_axis_fails(home, tmp_path):
+    run = tmp_path / "c.csv"
+    lines = (home / "a.csv").read_text().splitlines()
+    cells = lines[10].split(",")
+    run.write_text("\n".join([*lines[:10], ",".join([*cells[:2], "nan", *cells[3:]]), *lines[11:]]) + "\n")
+    words = ["train", str(run), "--test", str(home / "b.csv"), "--model", "M2", "-o", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2 and "column 'gyro_y', line 11" in result.stderr
+    assert "Written" not in result.stdout and not (tmp_path / "out").exists()

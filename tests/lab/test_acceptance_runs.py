@@ -9,6 +9,7 @@ from fogml.lab.acceptance import acceptance_json
 from fogml.lab.acceptance_rows import Limit, Limits
 from fogml.lab.rate_json import rate_json
 from fogml.report.acceptance_page import acceptance_page
+from fogml.runs.checks import check_run
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from tests.lab.units import EARTH, row
@@ -159,3 +160,21 @@ def test_runs_that_do_not_state_their_attitude_bring_no_earth_rate_into_biases(l
     alike = [Run.from_columns(one.name, Facts(unit=UP.unit, axis=UP.axis), **one.columns) for one in runs]
     told = row(acceptance_json(alike), "bias_repeatability")
     assert told["before"] == pytest.approx(np.std(biases, ddof=1), abs=1e-4)
+
+
+def test_an_output_at_the_ends_of_its_range_is_not_accepted(cycle, limits):
+    stated = limits(bias_stability=1.0)
+    assert acceptance_json([cycle.with_findings(check_run(cycle))], limits=stated)["verdict"] == "accepted"
+    at_rest, noisy = cycle.rate == 0.0, cycle.gyro + np.random.default_rng(3).normal(0.0, 0.05, len(cycle))
+    cut = np.where(at_rest, np.minimum(noisy, np.quantile(noisy[at_rest], 0.9)), cycle.gyro)
+    cut[~at_rest] = np.minimum(cut[~at_rest], cut[at_rest].max())
+    run = cycle.with_columns(gyro=cut)
+    told = acceptance_json([run.with_findings(check_run(run))], limits=stated)
+    assert told["verdict"] == "incomplete"
+    assert "may saturate" in told["reasons"][0]
+
+
+def test_what_can_not_be_as_stated_is_in_the_notes(cycle):
+    turned = cycle.with_columns(rate=-cycle.rate)
+    told = acceptance_json([turned.with_findings(check_run(turned))])
+    assert "with the other sign" in told["notes"][0]

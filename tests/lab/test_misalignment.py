@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements, _slopes, decouple
 from fogml.lab.misalignment_errors import cross_tilt_angle
-from fogml.lab.misalignment_json import compare_methods, relative_error_ppm
+from fogml.lab.misalignment_json import compare_methods, misalignment_json, relative_error_ppm
 from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
 
@@ -349,3 +349,28 @@ def test_rests_that_are_cut_away_whole_are_told_with_how_much_is_cut() -> None:
         from_samples(rows, time)
     longer, time = samples(UNIT, TILTS, (100.0,), rest_s=60.0, acceleration_deg_s2=10.0, turn_s=60.0)
     np.testing.assert_allclose(decouple(from_samples(longer, time)).K, UNIT.K, rtol=1e-6)
+
+
+def test_an_axis_that_points_down_lies_within_its_interval() -> None:
+    turns = measurements(UNIT, TILTS, RATES, noise=1e-4)
+    up, down = decouple(turns), decouple(replace(turns, output=-turns.output))
+    assert down.delta_deg == pytest.approx(180.0 - up.delta_deg, abs=1e-9)
+    low, high = down.intervals["delta_deg"]
+    assert low < down.delta_deg < high
+    assert (180.0 - high, 180.0 - low) == pytest.approx(up.intervals["delta_deg"], abs=1e-9)
+
+
+def test_what_is_no_scale_factor_s_is_said() -> None:
+    unit = replace(UNIT, K=1.0)
+    turns = replace(measurements(unit, TILTS, RATES, noise=1e-4), unit="deg/s")
+
+    def said(**changed: Any) -> str:
+        return " ".join(misalignment_json(replace(turns, **changed))["notes"])
+
+    assert "stated wrongly" not in said() and "saturate" not in said()
+    assert "K is 3600 where an output in deg/s shows about 1" in said(output=3600.0 * turns.output)
+    assert "stated wrongly" not in said(output=3600.0 * turns.output, unit="deg/h")
+    assert "does the output saturate" in said(output=np.clip(turns.output, -60.0, 60.0))
+    output = turns.output.copy()
+    output[7] *= 1.5
+    assert f"at {turns.rate_deg_s[7]:g} deg/s in state {turns.state[7]:g}" in said(output=output)

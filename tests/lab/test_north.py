@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from fogml.errors import InputError
 from fogml.lab.north import PALINDROME, Drift, DriftError, Scheme, drift_error, horizontal_rate
+from fogml.lab.north_json import recorded_north_json
 from fogml.lab.north_positions import north_from_positions
 from fogml.lab.north_schemes import (
     CoarseFine,
@@ -21,6 +22,7 @@ from fogml.lab.north_schemes import (
     ways_of_equal_time,
     wrapped,
 )
+from fogml.runs.checks import check_run
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 
@@ -311,3 +313,18 @@ def test_a_set_up_that_the_run_contradicts_is_noted() -> None:
     assert "--order" in north_from_positions(run, order_deg=order).notes[-1]
     up = Run(run.name, dict(run.columns), Facts(latitude=40.0, input_axis="up"))
     assert "points up" in " ".join(north_from_positions(up).notes)
+
+
+def test_a_gyro_that_stands_still_shows_no_north_and_a_stuck_one_says_so() -> None:
+    run = simulated_positions(Scheme(transfer_s=10.0), 77.0, 30.0, Drift(), bias_deg_h=0.4)
+    run = run.with_facts(Facts())
+    with pytest.raises(InputError, match="in every sample"):
+        recorded_north_json(run.with_columns(gyro=np.full(len(run), 5.0)), order_deg=Scheme().order_deg)
+    gyro = run.gyro + np.random.default_rng(0).normal(0.0, 0.05, len(run))
+    sound, stuck = run.with_columns(gyro=gyro), gyro.copy()
+    second = np.flatnonzero(run.columns["position"] == 2)
+    stuck[second] = stuck[second[0]]
+    for one, codes in ((sound, []), (run.with_columns(gyro=stuck), ["stuck_sensor"])):
+        noticed = one.with_findings(check_run(one))
+        told = recorded_north_json(noticed, order_deg=Scheme().order_deg)["findings"]
+        assert [finding["code"] for finding in told][:1] == codes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 from functools import lru_cache
 from typing import Any
@@ -16,6 +17,8 @@ from fogml.lab.rate_pieces import find_oscillations, find_plateaus, merged
 from fogml.lab.rate_programmes import rate_runs
 from fogml.lab.rate_response import bandwidth, gain_of
 from fogml.lab.rate_words import result_rows
+from fogml.report.rate_page import rate_page
+from fogml.runs.checks import check_run
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.twin.optics import Coil
@@ -213,3 +216,16 @@ def test_an_output_that_does_not_move_with_the_table_is_refused() -> None:
     run = by_hand(np.array([0.0, 10.0, -10.0, 20.0, -20.0]))
     with pytest.raises(InputError, match="table: the column 'gyro' stays at one value over all rates"):
         rate_json([run.with_columns(gyro=np.full(len(run), 3.0))], source="table")
+
+
+def test_what_was_noticed_in_the_runs_is_told_and_drawn() -> None:
+    ladder = np.array([0.0, 5.0, -5.0, 10.0, -10.0, 20.0, -20.0, 40.0, -40.0, 0.0])
+    sound = by_hand(ladder)
+    assert rate_json([sound.with_findings(check_run(sound))], source="sound")["findings"] == []
+    stuck = sound.gyro.copy()
+    stuck[200:320] = stuck[200]
+    for gyro, code in ((-sound.gyro, "implausible_scale_factor"), (stuck, "stuck_sensor")):
+        run = sound.with_columns(gyro=gyro)
+        told = rate_json([run.with_findings(check_run(run))], source="faulty")
+        assert ("table", code) == (told["findings"][0]["run"], told["findings"][0]["code"])
+        assert told["findings"][0]["message"][1:] in html.unescape(rate_page(told))

@@ -110,3 +110,24 @@ def test_a_run_that_is_too_short_is_refused(model, tmp_path):
         record_run(model, [run[:150]])
     with pytest.raises(InputError, match="no samples"):
         record_run(model, [])
+
+
+def test_an_output_that_is_not_the_gyro_s_is_not_kept(model, tmp_path):
+    run = read_run(write_run(tmp_path, 13))
+    gyro, half = run.gyro, len(run) // 2
+    stuck, turned, brief = gyro.copy(), gyro.copy(), gyro.copy()
+    stuck[half:] = stuck[half]
+    turned[100:200] += 36000.0
+    brief[half : half + 6] = brief.max()  # no more than a hundredth
+    for output, why in (
+        (stuck, "may be stuck|in every sample"),
+        (turned, "did the table turn"),
+        (np.clip(gyro, *np.quantile(gyro, [0.1, 0.9])), "may saturate"),
+    ):
+        for size in (len(run), 300):
+            spoilt = run.with_columns(gyro=output)
+            with pytest.raises(InputError, match=f"({why}).*it is not kept"):
+                record_run(model, [spoilt[i : i + size] for i in range(0, len(run), size)])
+    assert record_run(model, [run.with_columns(gyro=brief)]).samples == len(run)
+    with pytest.raises(InputError, match=r"kelvin.*it is not kept"):
+        record_run(model, [run.with_columns(T=run.columns["T"] + 273.15)])

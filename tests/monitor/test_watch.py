@@ -93,6 +93,8 @@ def test_when_to_calibrate_again_is_where_the_trend_passes_the_limit():
     assert told.due_days == pytest.approx(73.0, rel=0.25)
     words = calibration_words(values_of([unit])["units"][0])
     assert words.startswith("Calibrate again in")
+    (passed,) = watch(service(28, trend=0.02, seed=2), runs_between_false_alarms=1e9, bias_limit=0.01)
+    assert calibration_words(values_of([passed])["units"][0]).startswith("Calibrate now")
     (steady,) = watch(service(28), bias_limit=10.0)
     assert "No trend is seen" in calibration_words(values_of([steady])["units"][0])
 

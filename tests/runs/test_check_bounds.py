@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fogml.runs import arrival_times, dropouts, plausible
-from fogml.runs.checks import MOVED_DEGC, STUCK_S, check_run
+from fogml.runs.checks import check_run
 from fogml.runs.outliers import _none_stands_out, find_outliers
 from fogml.runs.run import Run
+from fogml.runs.stuck import MOVED_DEGC, STUCK_S
 
 BLOCK = 1024
 

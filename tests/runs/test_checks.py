@@ -335,6 +335,17 @@ class TestTemperatureSpan:
         assert codes({name: columns[name] for name in ("time", "gyro")}) == []
 
 
+def test_an_output_that_stays_while_the_table_changes_its_rate_is_stuck():
+    columns = noisy(20_000, 0.1)
+    columns["rate"] = turning(20_000, 0.1, dwell_s=50.0)
+    columns["gyro"] = np.round(columns["gyro"] + 3600.0 * columns["rate"], -3)  # rests at one value
+    assert "stuck_sensor" not in codes(columns)
+    columns["gyro"][9000:15_000] = columns["gyro"][9000]
+    finding = one(columns, "stuck_sensor")
+    assert finding.column == "gyro"
+    assert finding.count == pytest.approx(6000, abs=500)
+
+
 def test_a_million_sound_rows_have_no_fault():
     columns = noisy(1_000_000, 0.01)
     columns["rate"] = np.zeros(1_000_000)

@@ -263,3 +263,14 @@ def test_a_column_that_is_not_there(tmp_path):
     path.write_text(text_of(*ROWS))
     with pytest.raises(InputError, match=r"run\.csv.*'T_out'"):
         list(read_blocks(path, columns=["T_out"]))
+
+
+@pytest.mark.parametrize("repair", [False, True])
+@pytest.mark.parametrize(("column", "cure"), [("T", "leave the column out"), ("gyro", "correct them")])
+def test_a_column_without_any_value(tmp_path, column, cure, repair):
+    path = tmp_path / "run.csv"
+    cells = [row.split(",") for row in ROWS]
+    place = HEADER.split(",").index(f"{column} [{'degC' if column == 'T' else 'deg/h'}]")
+    path.write_text(text_of(*(",".join([*row[:place], "nan", *row[place + 1 :]]) for row in cells)))
+    with pytest.raises(InputError, match=f"column '{column}', line 2: .* 40 such .* no other; {cure}"):
+        read_run(path, repair=repair)

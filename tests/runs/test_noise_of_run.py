@@ -166,8 +166,18 @@ def test_asked_times_and_counts():
 def test_too_short():
     with pytest.raises(InputError, match="short: too short"):
         noise_report(Run.from_columns("short", time=[0.0, 1.0], gyro=[1.0, 2.0]))
+    rate = np.where(np.arange(500) % 3 == 0, 0.0, 5.0)
+    with pytest.raises(InputError, match="table turns at 333 of 500; give a longer run at rest"):
+        noise_report(still_run(n=500, rate=rate))
     with pytest.raises(InputError, match="still: Allan deviation: no averaging time"):
         noise_report(still_run(n=500), taus=[1e6])
+
+
+def test_an_output_that_stands_still_has_no_terms():
+    run = still_run(n=2000)
+    report = noise_report(run.with_columns(gyro=np.full(2000, 7.5)))
+    assert {(term["value"], *term["ci"]) for term in report["terms"].values()} == {(None, None, None)}
+    assert all("stands still" in term["reason"] for term in report["terms"].values())
 
 
 def test_each_value_four_times_and_a_filtered_output():

@@ -50,6 +50,7 @@ GIVEN_AWAY = {
     "hours stated as s": ({"time": SOUND["time"] / 3600.0}, {"implausible_clock"}),
     "days of a spreadsheet": ({"time": 45000.0 + SOUND["time"] / 86400.0}, {"implausible_clock"}),
     "a clock that began days ago": ({"time": 45000.0 + SOUND["time"]}, set()),
+    "us stated as s": ({"time": 1e6 * SOUND["time"]}, {"implausible_clock"}),
     "apart": ({"T_in": SOUND["T_in"] + 120.0}, {"thermometers_apart"}),
     "dropouts": ({"T_in": np.where(np.arange(ROWS) == 700, 85.0, SOUND["T_in"])}, {"temperature_dropouts"}),
 }
@@ -135,3 +136,12 @@ def test_a_coil_in_kelvin_is_not_beyond_what_a_gyro_stands(middle, unit):
     run = Run("run", columns(T_in=middle + np.linspace(-10.0, 10.0, ROWS)), FACTS)
     (found,) = [finding for finding in implausible(run) if finding.code == "implausible_temperature"]
     assert unit in found.message
+
+
+def test_a_slow_clock_is_told_and_a_year_of_weather_is_none():
+    days = np.arange(0.0, 200.0, 1.0 / 48.0)
+    season, day = 8.0 * np.cos(2.0 * np.pi * days / 365.0), 1.5 * np.sin(2.0 * np.pi * days)
+    noise = np.random.default_rng(2).normal(0.0, 0.3, len(days))
+    for temperature, codes in ((25.0 + season + day, []), (25.0 + season, ["implausible_clock"])):
+        run = Run("run", {"time": 86400.0 * days, "gyro": noise, "T": temperature}, Facts())
+        assert [finding.code for finding in implausible(run)] == codes

@@ -97,3 +97,13 @@ def test_a_run_of_one_gyro_has_to_be_of_the_axis(tmp_path):
     with pytest.raises(InputError, match="is of axis 'x'"):
         read_run(path, axis="y")
     assert read_run(path, axis="x").facts.axis == "x"
+
+
+def test_a_fault_is_in_the_column_as_the_file_calls_it(file):
+    path = file()
+    path.write_text(path.read_text().replace("4.0,5.0,", "4.0,nan,", 1))
+    with pytest.raises(InputError, match="column 'gyro_x', line 6"):
+        read_run(path, axis="x")
+    with pytest.raises(InputError, match="column 'gyro_x', line 6"):
+        list(read_blocks(path, axis="x"))
+    assert len(read_run(path, axis="y")) == ROWS

@@ -23,6 +23,9 @@ SEEN = Finding("seen_in_training", "holds the same samples as training run a.csv
 DEAD = Finding("dead_output", "'gyro' is 0 in every sample, as of one not connected", "gyro", 1, 36128)
 STUCK = Finding("stuck_sensor", "'gyro' stays at 1.5 from 10 s to 8000 s", "gyro", 10, 8000)
 
+CUT = Finding("saturation", "900 samples of 'gyro' at its extreme", "gyro", 1, 900, at_rest=900)
+TURNING_CUT = replace(CUT, at_rest=0)
+
 SIGN = Finding("implausible_scale_factor", "the output follows the table rate -1 times", "gyro", 1, 100)
 
 
@@ -70,6 +73,8 @@ def overconfident() -> Judgement:
 def test_nothing_against_is_use() -> None:
     found = advice_on(judgement())
     assert (found.grade, found.brief) == ("use", "judged on a run it has not seen")
+    # The end of a range that only the turning table reaches speaks against no drift model.
+    assert advice_on(judgement(findings=(TURNING_CUT,))).grade == "use"
 
 
 @pytest.mark.parametrize(
@@ -82,6 +87,8 @@ def test_nothing_against_is_use() -> None:
         (lambda: judgement(left=3.0), "do_not_use", "worse than none on b.csv"),
         (lambda: judgement(left=3.0, findings=(DEAD,)), "do_not_use", "the output of b.csv stands still"),
         (lambda: judgement(findings=(STUCK,)), "use_with_care", "the output of b.csv stands still"),
+        (lambda: judgement(findings=(CUT,)), "use_with_care", "the output of b.csv saturates"),
+        (lambda: trained_on(CUT), "use_with_care", "the output of a.csv saturates"),
         (lambda: trained_on(STUCK), "use_with_care", "the output of a.csv stands still"),
         (lambda: trained_on(DEAD), "do_not_use", "the output of a.csv stands still"),
         (
