@@ -90,6 +90,8 @@ def check_run(run: Run) -> tuple[Finding, ...]:
 
 def spoiling(run: Run) -> Iterator[Finding]:
     """Of `check_run` what makes an output's figures wrong: what can't be, spells of one value, saturation."""
+    if len(run) < 2:
+        return
     with np.errstate(over="ignore", invalid="ignore"):
         yield from implausible(run)
         yield from (finding for finding in stuck(run) if finding.column == "gyro")
