@@ -16,7 +16,7 @@ from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
-from fogml.runs.findings import DEAD, FIRST_OF_ALL, Finding
+from fogml.runs.findings import DEAD, FIRST_OF_ALL
 from fogml.runs.run import Run
 
 Check = Callable[[Sequence[Run]], None]
@@ -143,7 +143,7 @@ def open_runs(
             work.doing(f"reading {path}")
             runs += [_within(folders[path], run) for run in open_legs(path, repair=repair, axis=axis)]
             work.advance()
-    _note_findings(runs, terminal)
+    note_findings(runs, terminal)
     return runs
 
 
@@ -154,11 +154,12 @@ def open_noise(
     if path is None:
         return None
     run = open_run(path, repair=repair, axis=axis)
-    _note_findings([run], terminal)
+    note_findings([run], terminal)
     return run
 
 
-def _note_findings(runs: Sequence[Run], terminal: Terminal) -> None:
+def note_findings(runs: Sequence[Run], terminal: Terminal) -> None:
+    """Note on stderr what was noticed in runs, first what makes every figure wrong."""
     noticed = [(run.name, finding) for run in runs for finding in run.findings]
     for name, finding in sorted(noticed, key=lambda one: one[1].code not in FIRST_OF_ALL):
         terminal.note(f"{name}: {finding.message}")
@@ -171,14 +172,9 @@ def note_wrong(first: Run, terminal: Terminal) -> None:
     """
     from fogml.runs.checks import check_run
 
-    note_findings(first.name, (finding for finding in check_run(first) if finding.code != DEAD), terminal)
-
-
-def note_findings(name: str, findings: Iterable[Finding], terminal: Terminal) -> None:
-    """Note on stderr those findings of a run that make every figure wrong."""
-    for finding in findings:
-        if finding.code in FIRST_OF_ALL:
-            terminal.note(f"{name}: {finding.message}")
+    for finding in check_run(first):
+        if finding.code in FIRST_OF_ALL and finding.code != DEAD:
+            terminal.note(f"{first.name}: {finding.message}")
 
 
 Values = dict[str, Any]

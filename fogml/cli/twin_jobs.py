@@ -210,7 +210,7 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
     twin = None if elsewhere else load_twin(settings.twin)
     with terminal.work(f"reading {settings.run}") as work:
         run = open_run(settings.run, repair=settings.repair)
-        note_findings(run.name, run.findings, terminal)
+        note_findings([run], terminal)
         truth = read_truth(settings.truth) if settings.truth else None
         work.doing("replaying")
         if twin is None:
