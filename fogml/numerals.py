@@ -201,5 +201,5 @@ def in_order_of_serial(label: str) -> list[tuple[int, int | str]]:
     >>> sorted(["FOG-10", "FOG-9"], key=in_order_of_serial)
     ['FOG-9', 'FOG-10']
     """
-    parts = re.findall(r"\d+|\D+", label)
+    parts = re.findall(r"\d{1,99}|\D+", label)
     return [(0, int(part)) if part.isdecimal() else (1, part) for part in parts]

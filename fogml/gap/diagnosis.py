@@ -32,6 +32,7 @@ from fogml.gap.result_parts import Nearest, WhatIf
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.where import GapOnRun, where
 from fogml.processes import one_thread
+from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.twin.registry import effects
 from fogml.twin.twin import Twin
@@ -140,6 +141,7 @@ def inferred(
     check_runs(fit, held_out, noise)
     # The unit ages from its first run on, whichever it is.
     fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
+    fit, held_out = named_apart(fit, held_out)
     if not held_out:
         fit, held_out = keep_back(fit, (priors or STANDARD).rows.kept_back)
     with one_thread():

@@ -18,7 +18,7 @@ from fogml.arrays import FloatArray
 from fogml.runs.run import Run
 from fogml.twin.nominal import NAMES, UNITS, NominalConstants
 from fogml.twin.quantities import Grade, Quantity
-from fogml.twin.registry import effect, effects
+from fogml.twin.registry import clashing, effect, effects
 from fogml.twin.twin import Twin
 
 
@@ -196,7 +196,7 @@ class TwinModel:
         return {
             id: declared
             for id, declared in effects().items()
-            if declared.candidate and id not in on | self.lacks and not on & set(declared.conflicts)
+            if declared.candidate and id not in on | self.lacks and not clashing(declared, on)
         }
 
     def diagnosed(

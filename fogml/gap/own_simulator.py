@@ -25,11 +25,12 @@ from fogml.gap.model import AnyModel, Candidate, EffectValue, GyroModel, ModelOn
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Counterfactual, RunSeries
 from fogml.runs.columns import REPLAYED
+from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.twin.effect import Effect
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import NAMES, PRIOR_SD, nominal_columns
-from fogml.twin.registry import effects
+from fogml.twin.registry import clashing, effects
 from fogml.twin.replay import inputs_of_run, replay
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
@@ -123,11 +124,13 @@ class OwnOnRun:
 def candidates_of(model: AnyModel) -> dict[str, Effect]:
     """What may be named: a model's own candidates, or the catalogue's where it offers none.
 
+    Of the catalogue's none that can't be on beside what a twin has.
     A candidate that bears an id of the catalogue's has that one's family, and its own sizes.
     """
     catalogue = {id: declared for id, declared in effects().items() if declared.candidate}
     if isinstance(model, TwinModel):
-        return {id: declared for id, declared in catalogue.items() if id not in model.lacks}
+        known = {id: declared for id, declared in catalogue.items() if id not in model.lacks}
+        return {id: declared for id, declared in known.items() if not clashing(declared, model.twin.settings)}
     offered = dict(model.candidates())
     return {id: _declared(c, catalogue.get(id)) for id, c in offered.items()} if offered else catalogue
 
@@ -238,6 +241,7 @@ def by_column(twin: Twin, fit: Sequence[Run], held_out: Sequence[Run]) -> ByColu
     InputError
         If the output is in counts without a scale factor.
     """
+    fit, held_out = named_apart(fit, held_out)
     stand_in = _nearest(twin, fit)
     apart, made = {}, []
     for run in (*fit, *held_out):

@@ -98,8 +98,9 @@ class Scene:
         """When each run's clock began, after the first run's [s]; one after the other where unknown."""
         started = [r.run.facts.started for r in self.runs]
         if all(s is not None for s in started):
-            first = min(s.timestamp() for s in started)  # type: ignore[union-attr]
-            return tuple(s.timestamp() - first for s in started)  # type: ignore[union-attr]
+            # Differences of the moments themselves: a clock without a zone is not this machine's.
+            first = min(started)  # type: ignore[type-var]
+            return tuple((s - first).total_seconds() for s in started)  # type: ignore[operator]
         edges = np.cumsum([0.0, *(float(r.run.span_s) + r.row_s for r in self.runs)])
         return tuple(float(e) - float(r.run.time[0]) for e, r in zip(edges, self.runs))
 

@@ -179,7 +179,8 @@ def _temperatures(held: Sequence[_Averaged], settings: Reported) -> tuple[Temper
         np.concatenate([getattr(h, name) for h in held]) for name in ("temperature", "gap", "floor", "rising")
     )
     step = settings.bin_degc
-    edges = np.arange(step * np.floor(every.min() / step), every.max() + step, step)
+    # The last bin holds the greatest temperature, too.
+    edges = step * np.arange(np.floor(every.min() / step), np.floor(every.max() / step) + 2.0)
     bins = []
     for low, high in pairwise(edges):
         inside = (every >= low) & (every < high)

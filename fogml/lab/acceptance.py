@@ -16,6 +16,7 @@ from fogml.lab.acceptance_figures import Figure, figures_of, small_rates, soak_t
 from fogml.lab.acceptance_rows import QUANTITIES, Limits
 from fogml.models.table import usable_rows
 from fogml.runs.findings import IMPLAUSIBLE
+from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S
 from fogml.validation.advice import Asked
@@ -73,6 +74,7 @@ def acceptance_json(
     """
     limits = limits or Limits()
     _check_one_gyro(runs)
+    (runs,) = named_apart(runs)
     errors = [_errors(run, model) for run in runs]
     judged = [
         judge_run(one, averaging_s, (0.0, 0.0), one.run.earth_known, turn_on_band, noise) for one in errors
@@ -195,14 +197,16 @@ def _row(quantity: Any, found: Figure | None, limits: Limits, compensated: bool)
         "before": None if found is None else found.before,
         "after": None if found is None or not compensated else found.after,
         "at_most": found is not None and found.at_most,
+        "at_least": found is not None and found.at_least,
         "ci90": None if found is None or found.ci90 is None else list(found.ci90),
         "of": None if found is None else found.of,
         "remark": f"not tested: needs {quantity.needs}" if found is None else found.remark,
         "limit": None if limit is None else limit.as_json(),
         "met": None,
     }
-    if limit is not None and found is not None and (limit.holds(found.after) or not found.at_most):
-        row["met"] = bool(limit.holds(found.after))
+    if limit is not None and found is not None:
+        holds = bool(limit.holds(found.after))
+        row["met"] = None if (found.at_least if holds else found.at_most) else holds
     return row
 
 
@@ -229,7 +233,8 @@ def _verdict(
 
 def _lacking(row: Mapping[str, Any]) -> str:
     if row["tested"]:
-        return f"{row['name']} is only known to be at most a figure that is over its limit"
+        told = "least a figure that is within" if row["at_least"] else "most a figure that is over"
+        return f"{row['name']} is only known to be at {told} its limit"
     return f"{row['name']} has a limit and was not tested"
 
 

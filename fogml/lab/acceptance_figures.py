@@ -106,8 +106,8 @@ _MOST_NAMES = 3
 class Figure:
     """What the runs tell of a quantity: before and after compensation, the run it is from, and a remark.
 
-    `at_most` where they tell only that it is no more than that; `ci90` is the 90 % interval of the figure
-    after compensation, where it has one.
+    `at_most` or `at_least` where they tell only that it is no more, or no less, than that; `ci90` is the 90 %
+    interval of the figure after compensation, where it has one.
     """
 
     before: float
@@ -115,6 +115,7 @@ class Figure:
     of: str
     remark: str = ""
     at_most: bool = False
+    at_least: bool = False
     ci90: tuple[float, float] | None = None
 
 
@@ -224,11 +225,15 @@ def _of_rates(before: Sequence[Run], after: Sequence[Run]) -> Iterator[tuple[str
             Figure(before_ppm, after_ppm, names["temperature_sensitivity"], remark),
         )
     for key in ("threshold", "resolution"):
-        unseen, seen = (None if one[key] is None else one[key]["below_deg_h"] for one in told)
-        if unseen is not None and seen is not None:
-            over = told[1][key]["above_deg_h"]
+        ends = [(one[key]["below_deg_h"], one[key]["above_deg_h"]) for one in told if one[key] is not None]
+        sizes = [below or above for below, above in ends if below or above]
+        if len(sizes) == len(told):
+            seen, over = ends[1]
             remark = f"above {short(over)}" if over else "the smallest that was tested"
-            yield key, Figure(unseen, seen, names[key], remark, at_most=not over)
+            if not seen:
+                remark = "none as small as that shows, and none above was tested"
+            was, now = sizes
+            yield key, Figure(was, now, names[key], remark, at_most=not over, at_least=not seen)
 
 
 def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) -> Iterator[tuple[str, Figure]]:

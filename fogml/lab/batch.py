@@ -22,6 +22,7 @@ from fogml.numerals import in_order_of_serial
 SCHEMA = "fogml.batch/1"
 REPORT = "acceptance.json"
 _SHARES = {"least": 0.0, "q10": 0.1, "median": 0.5, "q90": 0.9, "largest": 1.0}
+_ROW = ("quantity", "tested", "limit", "met")
 _ORDER = {REJECTED: 0, INCOMPLETE: 1, NO_LIMITS: 2, ACCEPTED: 3}
 
 
@@ -39,6 +40,7 @@ def read_reports(paths: Sequence[str | Path]) -> list[tuple[Path, dict[str, Any]
         file = path / REPORT if path.is_dir() else path
         values = read_json(file, "name acceptance reports (acceptance.json) or their folders")
         held = json_object(values, str(file), ACCEPTANCE, "'fogml lab acceptance' writes one")
+        _check_whole(held, file)
         who = held.get("serial_number"), held.get("axis")
         if who in of:
             told = " ".join(str(part) for part in who if part) or "no unit by name"
@@ -46,6 +48,20 @@ def read_reports(paths: Sequence[str | Path]) -> list[tuple[Path, dict[str, Any]
         of[who] = file
         found.append((file, dict(held)))
     return found
+
+
+def _check_whole(report: Mapping[str, Any], file: Path) -> None:
+    """Hold that a report has what a batch reads of it."""
+    rows, verdict = report.get("rows"), report.get("verdict")
+    told = [isinstance(report.get(key, 0), str | None) for key in ("serial_number", "axis", "date")]
+    whole = all(told) and isinstance(report.get("reasons"), list) and isinstance(verdict, str)
+    if not (whole and verdict in _ORDER and isinstance(rows, list) and all(map(_is_row, rows))):
+        raise InputError(f"{file}: parts of an acceptance report lack; 'fogml lab acceptance' writes it anew")
+
+
+def _is_row(row: Any) -> bool:
+    figures = [row.get(key, "") for key in ("before", "after")] if isinstance(row, dict) else [""]
+    return all(isinstance(one, int | float | None) for one in figures) and {*_ROW} <= set(row)
 
 
 def batch_json(reports: Sequence[tuple[Path, Mapping[str, Any]]], home: Path | None = None) -> dict[str, Any]:

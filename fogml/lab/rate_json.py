@@ -29,6 +29,7 @@ from fogml.lab.rate_tests import (
 )
 from fogml.numerals import short
 from fogml.runs.findings import of_any_use
+from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.twin.coil import LayeredCoil, lead_sensitivity, midpoint_sensitivity, radial_sensitivity
@@ -81,6 +82,7 @@ def rate_json(
         If no run holds two lasting rates of the table, or an oscillation.
     """
     criteria = Criteria() if criteria is None else criteria
+    (runs,) = named_apart(runs)
     read = _read(runs, settle_s)
     greatest = max((float(np.abs(p.rate).max()) for _, p in read.ladders if len(p)), default=0.0)
     main = _main_ladder(read, greatest, criteria)

@@ -32,7 +32,7 @@ class Criteria:
     dead
         Share of the expected change of output below which a zone is dead: 10 % by IEEE Std 952.
     range_error
-        Share by which a rate within the range may miss the line of the rates below it.
+        Share by which a rate within the range may fall short of the line of the rates below it.
     small
         Share of the greatest rate below which rates tell threshold, dead zone and steps of resolution: they
         add little to the scale factor.
@@ -117,8 +117,8 @@ class Answer:
 def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | None:
     """Scale factor and range of a ladder of rates; None where fewer than two rates differ.
 
-    Rates are taken in by their size as long as the next one stays within `range_error` of the line through
-    those below it.
+    Rates are taken in by their size as long as the output of the next one falls short of the line through
+    those below it by `range_error` at most. Beyond a dead zone it catches up instead.
     """
     if len(plateaus) < 3 or len(np.unique(merged(plateaus.rate, plateaus.rate_error))) < 2:
         return None
@@ -132,8 +132,8 @@ def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | N
         scale, bias, drift = _fit(plateaus[below])
         expected = scale * plateaus.rate + bias + drift * plateaus.time
         top = (size >= 0.5 * (sizes[place - 1] + sizes[place])) & within
-        missed = np.abs(plateaus.output - expected)[top].max(initial=0.0)
-        if missed <= criteria.range_error * sizes[place]:
+        lacking = (np.sign(scale * plateaus.rate) * (expected - plateaus.output))[top].max(initial=0.0)
+        if lacking <= criteria.range_error * sizes[place]:
             break
         within = below
     kept, beyond = plateaus[within], plateaus[~within]

@@ -61,9 +61,10 @@ def limit_words(limit: Mapping[str, float | None] | None) -> str:
 
 
 def figure_words(row: Mapping[str, Any], when: str) -> str:
-    """A row's figure as people write it: one that is only known to be no more than that with its sign."""
+    """A row's figure as people write it: one that is only known to be no more or less with its sign."""
     told = number(row[when])
-    return f"≤ {told}" if row.get("at_most") and row[when] is not None else told
+    sign = "≤ " if row.get("at_most") else "≥ " if row.get("at_least") else ""
+    return f"{sign}{told}" if row[when] is not None else told
 
 
 def _shown(row: Mapping[str, Any]) -> dict[str, Any]:

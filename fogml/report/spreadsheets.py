@@ -27,7 +27,8 @@ def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
         for row in values["rows"]:
             limit = row["limit"] or {"from": None, "to": None}
             met = row["met"] if row["tested"] else "not tested"
-            remark = f"at most; {row['remark']}" if row.get("at_most") else row["remark"]
+            open_end = "at most; " if row.get("at_most") else "at least; " if row.get("at_least") else ""
+            remark = f"{open_end}{row['remark']}"
             rows.append((*(row[key] for key in keys), limit["from"], limit["to"], met, row["of"], remark))
         writer.table(sheet, (*_HEADS, *_MORE), rows, 3)
         sheet.set_column(0, 4, 24)

@@ -13,7 +13,7 @@ from fogml.twin.effect import Effect
 from fogml.twin.noise import NoiseConstants, generator
 from fogml.twin.nominal import NAMES, NominalConstants
 from fogml.twin.plant.standard import QUANTITIES
-from fogml.twin.registry import effect
+from fogml.twin.registry import clashing, effect
 from fogml.twin.twin import EffectSetting, Twin
 
 
@@ -48,7 +48,7 @@ def drawn_twin(twin: Twin, seed: int, number: int) -> Twin:
     changed = changed.with_noise(**noise)
     for id, held in twin.suspected.items():
         acts = rng.random() < held.probability
-        if acts and not set(effect(id).conflicts) & set(changed.settings):
+        if acts and not clashing(effect(id), changed.settings):
             changed = changed.with_effect(id, held.amplitude, **held.shape)
     return changed
 

@@ -201,7 +201,9 @@ class Inputs:
         if "angle" in self.drives:
             return self.drives["angle"]
         if "angle" not in self.cache:
-            mean = 0.5 * (self.table_rate + self.memory.previous("angle rate", self.table_rate))
+            along = abs(self.attitude.along)
+            rate = self.table_rate / along if along > LEAST_ALONG else self.table_rate
+            mean = 0.5 * (rate + self.memory.previous("angle rate", rate))
             self.cache["angle"] = self.memory.total("angle", self._step_s * mean)
         return self.cache["angle"]
 

@@ -18,6 +18,7 @@ from fogml.twin.inputs import Inputs
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.quantities import GRADES, Quantity
+from fogml.twin.registry import clashing, effects
 from fogml.twin.scenes import Scene, scene
 from fogml.twin.simulate import simulate
 from fogml.twin.truth import Truth
@@ -87,7 +88,7 @@ def card_values(declared: Effect) -> dict[str, Any]:
         "amplitude": _quantity(declared.amplitude),
         "shape": [_quantity(quantity) for quantity in declared.shape],
         "needs": list(declared.needs),
-        "conflicts": list(declared.conflicts),
+        "conflicts": clashing(declared, effects()),
         "shows": declared.shows,
         "shown_on": declared.shown_on,
         "confused_with": dict(declared.confused_with),

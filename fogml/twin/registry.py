@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import pkgutil
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import isabstract
@@ -61,6 +61,11 @@ def effect(id: str) -> Effect:
         hint = did_you_mean(id, _catalogue, most=3)
         raise InputError(f"there is no effect '{id}'; {hint}`fogml effects` lists them")
     return _catalogue[id]
+
+
+def clashing(declared: Effect, others: Iterable[str]) -> list[str]:
+    """Ids among others of effects that can't be on together with one, whichever of the two says so."""
+    return [id for id in others if id in declared.conflicts or declared.id in effect(id).conflicts]
 
 
 def register(declared: _Declared) -> _Declared:

@@ -89,7 +89,7 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
         table_rate=run.rate,
         earth_deg_h=run.facts.earth_rate_deg_h or 0.0,
         facts=_with_table_axis(run),
-        powered_on_s=windows[0][0] if windows else -math.inf,
+        powered_on_s=windows[0][0],
         power_ons_s=tuple(on for on, _ in windows[1:]),
         power_offs_s=tuple(off for _, off in windows[:-1]),
         drives=drives,
@@ -182,7 +182,7 @@ class Replayer:
         def signature(declared: Effect, setting: EffectSetting, inputs: Inputs) -> FloatArray:
             if self.truth is not None and declared.seeded and declared.id in self.truth.contributions:
                 # Only the truth holds what the simulation drew.
-                return self.truth.contributions[declared.id] / setting.amplitude
+                return self.truth.contributions[declared.id] / (setting.amplitude or 1.0)
             # What depends on the nominal gyro's slopes changes with its constants.
             slopes = twin.nominal if isinstance(declared, SensorEffect | ThermalEffect) else None
             key = (given.key, declared, setting.key, slopes)
@@ -287,8 +287,7 @@ def _power_windows(run: Run) -> PowerWindows:
     """When the unit was on: from the column ``time_on`` of a simulated run, else as recorded."""
     if "time_on" in run.columns and len(run):
         return _windows_of(run.time, read_time_on(run.columns["time_on"]))
-    powered = recorded_power(run)
-    return powered if powered else ((-math.inf, math.inf),)
+    return recorded_power(run)
 
 
 def _windows_of(time: FloatArray, time_on: FloatArray) -> PowerWindows:

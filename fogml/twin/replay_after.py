@@ -203,11 +203,11 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
             assert left is not None
             between = storage_times(ended, clock)
             if len(between):
-                state = plant_state(network, ended - _step(one), left)
+                state = plant_state(network, float(parts[-1][0][-1]), left)
                 nodes = stored_nodes(network, between, storage, windows, state)
                 last = {name: float(values[-1]) for name, values in parts[-1][3].items()}
                 drives = storage_drives(between, storage, last)
-                parts.append((between, nodes, np.zeros(len(between)), drives))
+                parts.append((between, _with_sensor(nodes), np.zeros(len(between)), drives))
                 left = {name: float(values[-1]) for name, values in nodes.items()}
         else:
             windows = own
@@ -221,7 +221,8 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
             state=_state_after(network, given.temperatures, parts[-1][0] if parts else None, left),
         )
         left = {name: float(values[-1]) for name, values in nodes.items()}
-        parts.append((time, {**nodes, **given.temperatures}, given.table_rate, dict(given.drives)))
+        temperatures = {**_with_sensor(nodes), **given.temperatures}
+        parts.append((time, temperatures, given.table_rate, dict(given.drives)))
         ended = float(time[-1]) + _step(one)
     target = Replayer(run)
     given = target.surrounded(twin, target.recorded)
@@ -243,6 +244,11 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
     seen = {name: values for name, values in whole.temperatures.items() if name in given.temperatures}
     nominal = replace(whole, temperatures=seen)
     return whole, nominal, len(run)
+
+
+def _with_sensor(nodes: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """A plant's temperatures, and ``T``: an only sensor sits on the coil's inner face."""
+    return {"T": nodes["T_in"], **nodes}
 
 
 def _in_order(run: Run, after: Sequence[Run]) -> list[Run]:

@@ -27,6 +27,8 @@ from fogml.twin.table import Table, Wave
 
 _REST: dict[Switched, float] = {"power": 1.0, "fan": 1.0, "yaw": 0.0, "radiation": 0.0}
 _SLACK_S = 1e-6
+MOST_STEPS = 1_000_000
+"""Steps of a programme, repeats written out: one a minute for two years, and some seconds to work out."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,11 @@ def schedule(
     name
         For messages.
     """
+    if (count := _count(steps)) > MOST_STEPS:
+        raise InputError(
+            f"{name}: with repeats written out it has {count} steps, and {MOST_STEPS} are the most; repeat "
+            "fewer times"
+        )
     set_point, table = Track(), Table(table_acceleration)
     moments: dict[Switched, list[tuple[float, Setting, str]]] = {what: [] for what in SWITCHED}
     now, temperature = 0.0, start_temperature
@@ -139,6 +146,11 @@ def schedule(
     times, rates, angles = table.knots()
     turning = Track(times, rates), Track(times, angles)
     return Schedule(set_point, *turning, tuple(table.waves), settings, tuple(starts), tuple(names), now)
+
+
+def _count(steps: Sequence[Step]) -> int:
+    """Number of steps, repeats written out."""
+    return sum(step.count * _count(step.steps) if isinstance(step, Repeat) else 1 for step in steps)
 
 
 def _flat(steps: Sequence[Step], above: str = "step ") -> Iterator[tuple[str, Soak | Hold | Ramp]]:

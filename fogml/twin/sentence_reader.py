@@ -110,7 +110,7 @@ class SentenceReader:
     def count(self) -> int:
         """A whole number of at least 1."""
         place, value = self.place, self.number()
-        if value < 1.0 or value != int(value):
+        if not (value >= 1.0 and value.is_integer()):
             self.fail("a whole number of at least 1 was expected here", place)
         self._skip()
         return int(value)

@@ -123,7 +123,15 @@ def read_truth(path: str | Path) -> Truth:
     try:
         # "nan" is a number: a column of nothing else stays one of numbers.
         table = csv.read_csv(path, convert_options=csv.ConvertOptions(null_values=[""]))
-        columns = {name: table.column(name).to_numpy() for name in table.column_names}
+        # Cells that are all empty, as a spreadsheet leaves those of no number, are no text.
+        fields = [
+            arrow.field(f.name, arrow.float64() if arrow.types.is_null(f.type) else f.type)
+            for f in table.schema
+        ]
+        table = table.cast(arrow.schema(fields))
+        columns = dict(zip(table.column_names, (column.to_numpy() for column in table.columns)))
     except (OSError, arrow.ArrowException) as error:
         raise InputError(f"{path}: no truth can be read from it ({str(error).splitlines()[0]})") from None
+    if len(columns) < table.num_columns:
+        raise InputError(f"{path}: two of its columns have one name; remove one of them")
     return truth_from_columns(columns, path.name)

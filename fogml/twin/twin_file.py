@@ -40,6 +40,7 @@ from fogml.twin.twin_schema import (
     HEATING,
     LINE,
     NOMINAL,
+    PROBABILITY,
     RECEIVER,
     TWIN_FILE,
     Stated,
@@ -242,10 +243,8 @@ def _suspected(source: str, id: str, entry: Mapping[str, Stated]) -> Suspected:
         raise InputError(f"nothing is given for 'suspected.{id}.probability'")
     rest = {name: held for name, held in entry.items() if name != "probability"}
     setting = _setting(source, id, rest, "suspected")
-    try:
-        return Suspected(entry["probability"].value, setting.amplitude, setting.shape)
-    except InputError as error:
-        raise InputError(f"key 'suspected.{id}': {error}") from None
+    probability = _value(source, f"suspected.{id}.probability", entry["probability"], PROBABILITY)
+    return Suspected(probability, setting.amplitude, setting.shape)
 
 
 def _setting(source: str, id: str, entry: Mapping[str, Stated], section: str = "effects") -> EffectSetting:

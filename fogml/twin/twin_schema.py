@@ -56,6 +56,7 @@ LINE = (
     _quantity("outer_radius", "m", 1e-4, 10.0),
     _quantity("diffusivity", "m2/s", 1e-9, 1e-3),
 )
+PROBABILITY = _quantity("probability", "1", 0.0, 1.0)
 
 
 class Stated(Strict):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 from typing import Any
@@ -37,9 +38,21 @@ def test_runs_of_known_start_lie_as_stated() -> None:
 
 def test_a_line_of_a_quiet_run_stands_out_beside_a_loud_run() -> None:
     """Each run's power counts by its own."""
-    rng, time = np.random.default_rng(4), 60.0 * np.arange(600)
-    line = 0.3 * np.sin(2.0 * np.pi * 2e-3 * time)
+    rng, seconds = np.random.default_rng(4), 60.0 * np.arange(600)
+    line = 0.3 * np.sin(2.0 * np.pi * 2e-3 * seconds)
     gaps = [30.0 * rng.standard_normal(600), 0.1 * rng.standard_normal(600) + line]
-    fit = tuple(SimpleNamespace(time_s=time, constants=np.ones((600, 1)), gap=gap) for gap in gaps)
+    fit = tuple(SimpleNamespace(time_s=seconds, constants=np.ones((600, 1)), gap=gap) for gap in gaps)
     scene: Any = SimpleNamespace(grids=Grids(), fit=fit, span_s=36_000.0, row_s=60.0)
     assert outstanding_lines(scene)[0] == pytest.approx(2e-3, abs=1.0 / 36_000.0)
+
+
+def test_a_clock_without_a_zone_is_not_put_on_this_machines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over the change to summer time a day of Berlin has 23 h; a clock that states no zone has 24."""
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    time.tzset()
+    try:
+        runs = [rows(0.0, 990.0, 10.0, datetime(2026, 3, day)) for day in (28, 30)]
+        assert begun(*runs) == pytest.approx((0.0, 2.0 * 86_400.0))
+    finally:
+        monkeypatch.undo()
+        time.tzset()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.model import EffectValue, NoisePrior, TwinModel
+from fogml.gap.own_simulator import candidates_of
 from fogml.gap.where import averages
 from fogml.twin.twin_file import load_twin, save_twin
 
@@ -50,3 +51,9 @@ def test_windows_keep_off_gaps_and_are_whole():
     assert windows.window_s == 100.0
     coarse = averages(parted, averaging_s=5.0)
     assert coarse.window_s == 20.0 and len(coarse.time) == len(parted)
+
+
+def test_what_the_twin_excludes_is_no_candidate():
+    twin = load_twin("nominal").with_effect("shupe_winding", 1.0)
+    assert "shupe_pure" in candidates_of(TwinModel(load_twin("nominal")))
+    assert not {"shupe_pure"} & ({*candidates_of(TwinModel(twin))} | {*TwinModel(twin).candidates()})

@@ -124,3 +124,11 @@ def test_noise_alone_is_significant_nowhere():
             flagged += item.significant
     # A regime or a temperature is flagged at 2.6 standard deviations.
     assert flagged <= 0.15 * told, f"{flagged} of {told}"
+
+
+def test_a_soak_at_the_edge_of_a_bin_is_in_one():
+    """A thermometer of whole steps stands at 60 degC sharp."""
+    temperature, flat = np.repeat([-20.0, 0.0, 60.0, 60.0], 10), np.ones(40)
+    held = SimpleNamespace(temperature=temperature, gap=flat, floor=0.1 * flat, rising=0.0 * flat)
+    bins = _temperatures([held], STANDARD.reported)
+    assert [(one.from_degc, one.to_degc) for one in bins] == [(-20.0, -10.0), (0.0, 10.0), (60.0, 70.0)]

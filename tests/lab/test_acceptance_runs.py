@@ -178,3 +178,15 @@ def test_what_can_not_be_as_stated_is_in_the_notes(cycle):
     turned = cycle.with_columns(rate=-cycle.rate)
     told = acceptance_json([turned.with_findings(check_run(turned))])
     assert "with the other sign" in told["notes"][0]
+
+
+def test_a_threshold_above_all_that_was_tested_is_told_and_misses_its_limit():
+    large = 3600.0 * np.array([0.0, 10.0, -10.0, 50.0, -50.0, 100.0, -100.0, 0.0])
+    small = np.array([0.0, *(sign * size for size in (0.1, 0.2, 0.5) for sign in (1.0, 0.0, -1.0)), 0.0])
+    runs = [table_run("run.csv", large, large), table_run("run.csv", small, 0.0 * small, seed=1)]
+    for most, met, verdict in ((0.2, False, "rejected"), (1.0, None, "incomplete")):
+        values = acceptance_json(runs, limits=Limits({"threshold": Limit(-most, most)}))
+        told = row(values, "threshold")
+        assert told["tested"] and told["at_least"] and told["before"] == pytest.approx(0.5)
+        assert told["met"] is met and values["verdict"] == verdict
+    assert "≥ 0.5" in acceptance_page(values)

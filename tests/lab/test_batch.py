@@ -13,6 +13,7 @@ from fogml.cli.main import app
 from fogml.errors import InputError
 from fogml.lab.acceptance_rows import QUANTITIES
 from fogml.lab.batch import batch_json, read_reports
+from fogml.numerals import in_order_of_serial
 
 SERIAL = "FOG-70-A-2026-BATCH-17-OF-THE-SECOND-LINE-{:04d}"
 LIMIT = {"from": -0.05, "to": 0.05}
@@ -123,3 +124,19 @@ def test_command(folders, tmp_path):
     sheet = openpyxl.load_workbook(tmp_path / "batch" / "batch.xlsx")["Units"]
     lines = list(sheet.iter_rows(min_row=2, values_only=True))
     assert len(lines) == 10 and lines[0][2] == "rejected"
+
+
+@pytest.mark.parametrize(
+    "damage", [{"serial_number": ["FOG"]}, {"rows": [{}]}, {"verdict": "good"}, {"reasons": None}]
+)
+def test_a_damaged_report_is_named(tmp_path, damage):
+    path = tmp_path / "acceptance.json"
+    path.write_text(json.dumps({**report(1, 0.02), **damage}))
+    with pytest.raises(InputError, match="parts of an acceptance report lack"):
+        read_reports([path])
+
+
+def test_serial_numbers_may_hold_any_digits():
+    """A superscript two is a digit and no number; one of thousands of digits is longer than Python reads."""
+    labels = ["FOG-10", "FOG-9²", "FOG-9", "FOG-" + "8" * 5000]
+    assert sorted(labels, key=in_order_of_serial) == ["FOG-9", "FOG-9²", "FOG-10", labels[3]]

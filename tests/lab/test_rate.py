@@ -229,3 +229,29 @@ def test_what_was_noticed_in_the_runs_is_told_and_drawn() -> None:
         told = rate_json([run.with_findings(check_run(run))], source="faulty")
         assert ("table", code) == (told["findings"][0]["run"], told["findings"][0]["code"])
         assert told["findings"][0]["message"][1:] in html.unescape(rate_page(told))
+
+
+def zone_and_ladder() -> tuple[Run, Run]:
+    """Plateaus of 60 s of a gyro with a dead zone of 0.2 deg/h: small rates, and large ones."""
+    runs = []
+    for sizes in ((0.05, 0.1, 0.2, 0.5, 1.0, 2.0), (36e3, 72e3, 360e3)):
+        rates = np.repeat([0.0, *(sign * size for size in sizes for sign in (1.0, 0.0, -1.0)), 0.0], 60)
+        seen = np.sign(rates) * np.sqrt(np.maximum(rates**2 - 0.2**2, 0.0))
+        time = np.arange(float(len(rates)))
+        runs.append(Run.from_columns("run.csv", time=time, gyro=seen, rate=rates / 3600.0))
+    return runs[0], runs[1]
+
+
+def test_runs_of_one_name_are_all_told_of() -> None:
+    small, large = zone_and_ladder()
+    for runs in ((small, large), (large, small)):
+        told = rate_json(runs, source="")
+        assert told["threshold"] == {"above_deg_h": pytest.approx(0.2), "below_deg_h": pytest.approx(0.5)}
+        assert len(set(told["runs"])) == 2
+
+
+def test_a_dead_zone_is_not_the_end_of_the_range() -> None:
+    """Alone, small rates are a ladder: its line goes through all of them, not the dead ones."""
+    told = rate_json(zone_and_ladder()[:1], source="")
+    assert told["range"]["exceeded_deg_s"] is None
+    assert told["scale_factor"]["scale_factor"] == pytest.approx(1.0, abs=0.03)

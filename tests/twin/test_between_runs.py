@@ -10,6 +10,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.gap.diagnosis import with_epoch
 from fogml.runs.facts import Facts
+from fogml.runs.run import Run
 from fogml.twin.effect import NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.registry import effect, effects
@@ -199,3 +200,36 @@ def test_samples_of_a_storage_lie_within_it() -> None:
     found = storage_times(100.0, 1e6)
     assert found[0] == 100.0 and found[-1] < 1e6 and np.all(np.diff(found) > 0.0)
     assert not len(storage_times(5.0, 5.0))
+
+
+def test_an_only_sensor_tells_of_both_runs() -> None:
+    """`T` stands for the coil's inner face in storage as in the runs."""
+    twin = (
+        Twin("unit")
+        .with_nominal(b0=1.0, b1=0.1, m=2.0)
+        .with_effect("thermal_hysteresis", 0.3, half_width=5.0)
+    )
+
+    def made(hours: float, column: str) -> Run:
+        run = simulate(RAMP, twin, sample_s=10.0, facts=facts(hours), columns=("T_in", "rate")).run
+        columns = {column if name == "T_in" else name: values for name, values in run.columns.items()}
+        return Run.derived(run.name, columns, run.facts, "deg/h")
+
+    told = [replay_after(twin, made(5.0, column), [made(0.0, column)]) for column in ("T", "T_in")]
+    np.testing.assert_allclose(told[0], told[1], atol=1e-9)
+
+
+def test_storage_goes_on_from_the_last_sample_of_the_run_before() -> None:
+    """Runs of other sample intervals: an unrecorded node cools from when it was last known."""
+    twin = Twin("unit", plant=load_twin("tactical").plant).with_effect(
+        "electronic_crosstalk", 1.0, supply_ratio=0.0
+    )
+    hot = [{"ramp to 70 degC at 5 degC/min": []}]
+    columns = ("T_chamber", "T_in", "T_out")
+    first = simulate(hot, twin, sample_s=60.0, facts=facts(), columns=columns)
+    second = simulate(
+        ["hold for 1 h"], twin, sample_s=1.0, facts=facts(0.5), columns=columns, after=first, truth=True
+    )
+    assert second.truth is not None
+    told = replay_after(twin, second.run, [first.run])
+    np.testing.assert_allclose(told, second.truth.noise_free, atol=0.05)

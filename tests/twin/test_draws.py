@@ -110,3 +110,17 @@ def test_without_air_or_another_node_no_plant_is_fitted():
     for columns in (["T_in", "T_out"], ["T_chamber"]):
         run = simulate(STEPS, "nominal", sample_s=60.0, columns=columns).run
         assert fit_plant(Plant(), [run]) is None
+
+
+def test_what_can_not_be_on_beside_another_is_drawn_by_neither_card():
+    """`shupe_winding` says that it excludes `shupe_pure`; the other card says nothing of it."""
+    suspected = {"shupe_pure": Suspected(1.0, 0.5, {})}
+    twin = replace(load_twin("nominal").with_effect("shupe_winding", 1.0), suspected=suspected)
+    assert set(drawn_twin(twin, 0, 1).settings) == {"shupe_winding"}
+
+
+def test_a_probability_in_percent_is_not_taken_for_a_share():
+    values = twin_dict(unsure())
+    values["suspected"]["glass_transition"]["probability"] = {"value": 0.5, "unit": "%"}
+    with pytest.raises(InputError, match=r"suspected.glass_transition.probability' has unit '%'"):
+        load_twin(values)

@@ -113,3 +113,13 @@ def test_wrong_unit_and_sign() -> None:
     assert seconds == pytest.approx(output / 3600.0)
     given = replace(inputs(TIME), output=output)
     assert np.array_equal(units.signature(given), output)
+
+
+def test_counts_after_a_sample_that_stands_alone_are_whole_and_lose_nothing() -> None:
+    """A unit that is switched on at the last sample of a block begins with one sample of unknown length."""
+    counts, memory, rate = logger("output_counts"), Memory(), 5.0 + wave(TIME[:500])
+    parts = [counts.record(rate[a:b], inputs(TIME[a:b], memory), 0.7) for a, b in ((0, 1), (1, 500))]
+    whole = parts[1] / 0.7
+    np.testing.assert_allclose(whole, np.rint(whole), atol=1e-9)
+    assert abs(parts[1].sum() - rate[1:].sum()) < 0.7
+    np.testing.assert_array_equal(parts[0], rate[:1])

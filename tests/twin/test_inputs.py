@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.runs.facts import Direction, Facts
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 
@@ -73,3 +74,11 @@ def test_time_since_the_latest_power_on() -> None:
     assert given.time_on_s[[0, 19, 20, 69, 70]].tolist() == [40.0, 230.0, 0.0, 490.0, 0.0]
     assert given.power_cycle[[0, 19, 20, 70]].tolist() == [0, 0, 1, 2]
     assert replace(given, powered_on_s=150.0).time_on_s[0] == 0.0
+
+
+def test_angle_of_a_table_that_is_not_square_to_the_axis() -> None:
+    """A table tilted by 60 deg turns twice as fast as the rate about the input axis that is recorded."""
+    facts = Facts(input_axis="up", table_axis=Direction(heading=0.0, elevation=30.0))
+    given = Inputs(np.arange(10.0), {}, np.full(10, 3.0), facts=facts)
+    np.testing.assert_allclose(given.angle_deg, 6.0 * np.arange(10.0))
+    np.testing.assert_allclose(given.turning_deg_s, 6.0)

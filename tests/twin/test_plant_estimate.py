@@ -111,4 +111,20 @@ def test_power_windows_of_a_recording() -> None:
     assert recorded_power(run(power=power)) == ((-math.inf, 3.0), (5.0, 8.0))
     assert recorded_power(run(Facts(powered_on=-30.0), supply=power)) == ((-30.0, 3.0), (5.0, 8.0))
     assert recorded_power(run(power=power[::-1])) == ((2.0, 5.0), (7.0, math.inf))
-    assert recorded_power(run(power=np.zeros(10))) == ()
+    assert recorded_power(run(power=np.zeros(10))) == ((-math.inf, math.inf),)
+
+
+def test_a_column_of_no_power_says_nothing_of_when_the_unit_was_on() -> None:
+    """A twin without heat of its own draws none: the supply or the stated power-on tells."""
+    time, facts = np.arange(6.0), Facts(powered_on=-30.0)
+    told = Run.from_columns("a", facts, time=time, gyro=0.0 * time, power=0.0 * time)
+    assert recorded_power(told) == ((-30.0, math.inf),)
+    supply = np.array([0.0, 0.0, 28.0, 28.0, 0.0, 28.0])
+    both = Run.from_columns("b", facts, time=time, gyro=0.0 * time, power=0.0 * time, supply=supply)
+    assert recorded_power(both) == ((2.0, 4.0), (5.0, math.inf))
+
+
+def test_a_power_that_lacks_a_reading_is_no_power_cycle() -> None:
+    power = np.array([np.nan, 3.0, 3.0, np.nan, 3.0])
+    run = Run.derived("a", {"time": np.arange(5.0), "gyro": np.zeros(5), "power": power}, Facts(), "deg/h")
+    assert recorded_power(run) == ((-math.inf, math.inf),)

@@ -294,3 +294,13 @@ def test_a_programme_may_state_how_the_gyro_is_mounted() -> None:
     assert default_facts(load_programme("multi-point-cycle")).input_axis == "up"
     with pytest.raises(InputError, match="input_axis"):
         programme_from({"input_axis": "sideways", "steps": ["hold for 60 s"]})
+
+
+def test_a_programme_that_repeats_without_end_is_refused_at_once() -> None:
+    with pytest.raises(InputError, match="whole number of at least 1"):
+        parse_step("repeat 1e999 times")
+    steps: list[Any] = ["hold for 1 s"]
+    for _ in range(3):
+        steps = [{"repeat 1000 times": steps}]
+    with pytest.raises(InputError, match="1000000000 steps"):
+        programme_from(steps)

@@ -19,7 +19,7 @@ from fogml.twin.registry import effect, effects
 from fogml.twin.replay import inputs_of_run, replay
 from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.simulate import DEFAULT_COLUMNS, simulate
-from fogml.twin.truth import truth_from_columns
+from fogml.twin.truth import read_truth, truth_from_columns
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
 
@@ -257,3 +257,27 @@ def test_noisy_readings_are_still_told_from_quiet_ones(sample_s):
     twin = replace(load_twin("tactical"), settings={})
     noisy, _ = inputs_of_run(simulate("multi-point-cycle", twin, sample_s=sample_s).run)
     assert noisy.rate_window_s > 0.0
+
+
+def test_warm_up_of_a_unit_that_draws_no_power_begins_when_it_was_switched_on() -> None:
+    twin = replace(Twin().with_effect("warmup_bias", 2.0), noise=NoiseConstants())
+    made = simulate(["hold for 10 min", {"hold for 1 h": ["power on"]}], twin, sample_s=10.0, truth=True)
+    assert made.truth is not None and not made.run.columns["power"].any()
+    np.testing.assert_allclose(replay(twin, made.run), made.truth.noise_free, atol=1e-9)
+
+
+def test_a_drawn_effect_of_no_size_leaves_the_replay_of_a_truth_alone() -> None:
+    twin = replace(Twin().with_nominal(b0=1.0).with_effect("turn_on_bias", 0.0), noise=NoiseConstants())
+    made = simulate(["hold for 10 min"], twin, sample_s=10.0, truth=True)
+    assert made.truth is not None
+    np.testing.assert_allclose(replay(twin, made.run, truth=made.truth), made.truth.noise_free)
+
+
+def test_a_truth_that_went_through_a_spreadsheet(tmp_path) -> None:
+    """A time since power-on of no value comes back as an empty cell; a column that comes twice is told."""
+    cells = "time [s],rate [deg/s],time_on [s],noise_free [deg/h],noise [deg/h],T_in [degC]"
+    (tmp_path / "empty.csv").write_text(f"{cells}\n0,0,,1,0,25\n1,0,,1,0,25\n")
+    assert np.isinf(read_truth(tmp_path / "empty.csv").time_on).all()
+    (tmp_path / "twice.csv").write_text(f"{cells},T_in [degC]\n0,0,,1,0,25,25\n")
+    with pytest.raises(InputError, match="two of its columns have one name"):
+        read_truth(tmp_path / "twice.csv")

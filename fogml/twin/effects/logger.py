@@ -187,6 +187,9 @@ class OutputCounts(LoggerEffect):
         step = inputs.time - inputs.memory.previous(f"{self.id} time", inputs.time)
         # The first sample is as long as the next one.
         usual = inputs.memory.first(f"{self.id} step", step[1:] if step[0] <= 0.0 else step)
+        if np.isnan(usual):
+            # Nothing tells how long a sample is that stands alone: it is no count yet.
+            return output
         step = np.where((step > 0.0) & (step <= self.gap * usual), step, usual)
         # 1 deg/h is 1 arcsec per second.
         per_rate = step / amplitude

@@ -94,17 +94,20 @@ def estimate_nodes(
 def recorded_power(run: Run) -> PowerWindows:
     """When the unit was on, from a run's columns ``power`` or ``supply``, and its facts.
 
-    On is above a fifth of the largest value. A unit that is on at the first sample was switched
-    on at the fact ``powered_on``, or long before where that is not stated.
+    On is above a fifth of the largest value; a column that is never above 0 tells nothing. A unit that is on
+    at the first sample was switched on at the fact ``powered_on``, or long before where that is not stated.
     """
     earlier = -math.inf if run.facts.powered_on is None else run.facts.powered_on
-    column = next((run.columns[name] for name in ("power", "supply") if name in run.columns), None)
-    if column is None or len(run) == 0:
+    columns = [run.columns[name] for name in ("power", "supply") if name in run.columns]
+    column = next((values for values in columns if np.any(values > 0.0)), None)
+    if column is None:
         return ((earlier, math.inf),)
+    held = np.isfinite(column)
+    time, column = run.time[held], column[held]
     on = column > _ON_SHARE * column.max()
-    changes = run.time[1:][np.diff(on.astype(np.int8)) != 0].tolist()
+    changes = time[1:][np.diff(on.astype(np.int8)) != 0].tolist()
     edges = [
-        *([min(earlier, float(run.time[0]))] if on[0] else []),
+        *([min(earlier, float(time[0]))] if on[0] else []),
         *changes,
         *([math.inf] if on[-1] else []),
     ]
