@@ -70,7 +70,8 @@ def _courses(
     courses = []
     for id, declared in scene.candidates.items():
         acts = id in by_id or id in on
-        if not acts and not _linear(declared):
+        # A size that acts out of proportion moves no course of its own: it stays in what is replayed.
+        if declared.amplitudes or not (acts or _linear(declared)):
             continue
         if id in by_id:
             size, course = sizes[id], after.of_cause(run, by_id[id])

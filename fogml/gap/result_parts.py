@@ -282,7 +282,7 @@ class Counterfactual:
     """A run as averages of shape (k,): recorded, replayed without any effect, and what each effect adds.
 
     Effects are linear in their size, so that ``replayed + sum of factor * course`` is exact at any factors;
-    those that are not, as a deadband, are left out.
+    those that are not, as a deadband, are left out, and part of what is replayed where they act.
     """
 
     run: str

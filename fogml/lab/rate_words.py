@@ -139,8 +139,10 @@ def _response(values: Mapping[str, Any]) -> list[ResultRow]:
 
 
 def bracketed(found: Mapping[str, float | None]) -> str:
-    """``0.2 to 0.5``, ``at most 0.001``, ``above 50``."""
+    """``0.2 to 0.5``, ``at most 0.001``, ``above 50``; ``within noise`` where no rate tells a side."""
     above, below = found["above_deg_h"], found["below_deg_h"]
+    if above is None and below is None:
+        return "within noise"
     if below is None:
         return f"above {number(above)}"
     return f"at most {number(below)}" if not above else f"{number(above)} to {number(below)}"

@@ -7,9 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fogml.gap.better_twin import _courses
 from fogml.gap.model import EffectValue, NoisePrior, TwinModel
 from fogml.gap.own_simulator import candidates_of
 from fogml.gap.where import averages
+from fogml.twin.registry import effect
 from fogml.twin.twin_file import load_twin, save_twin
 
 TWIN = load_twin("nominal").with_nominal(b0=1.0, e0=100.0)
@@ -57,3 +59,19 @@ def test_what_the_twin_excludes_is_no_candidate():
     twin = load_twin("nominal").with_effect("shupe_winding", 1.0)
     assert "shupe_pure" in candidates_of(TwinModel(load_twin("nominal")))
     assert not {"shupe_pure"} & ({*candidates_of(TwinModel(twin))} | {*TwinModel(twin).candidates()})
+
+
+def test_what_is_out_of_proportion_to_its_size_has_no_slider():
+    """Half of what a dead zone makes is not what half a dead zone makes; it stays in what is replayed."""
+    candidates = {id: effect(id) for id in ("deadband", "shupe_mohr", "thermal_hysteresis")}
+    rows = SimpleNamespace(made=lambda declared, size, shape, values: size * np.ones(3))
+    on = [(effect("deadband"), SimpleNamespace(amplitude=0.3, shape={}))]
+    found = SimpleNamespace(
+        scene=SimpleNamespace(candidates=candidates, runs=[rows], grade="tactical"),
+        setting=SimpleNamespace(values={}),
+        plant=SimpleNamespace(on=on),
+    )
+    after = SimpleNamespace(of_cause=lambda run, cause: 2.0 * np.ones(3))
+    named = [SimpleNamespace(ids=("shupe_mohr",))]
+    courses = _courses(found, after, named, {"shupe_mohr": 0.5}, 0)
+    assert [(c.effect, c.acts) for c in courses] == [("shupe_mohr", True), ("thermal_hysteresis", False)]

@@ -16,7 +16,8 @@ from fogml.lab.rate_json import rate_json, unit_facts
 from fogml.lab.rate_pieces import find_oscillations, find_plateaus, merged
 from fogml.lab.rate_programmes import rate_runs
 from fogml.lab.rate_response import bandwidth, gain_of
-from fogml.lab.rate_words import result_rows
+from fogml.lab.rate_tests import Answer, Criteria, least_seen
+from fogml.lab.rate_words import bracketed, result_rows
 from fogml.report.rate_page import rate_page
 from fogml.runs.checks import check_run
 from fogml.runs.facts import Facts
@@ -255,3 +256,9 @@ def test_a_dead_zone_is_not_the_end_of_the_range() -> None:
     told = rate_json(zone_and_ladder()[:1], source="")
     assert told["range"]["exceeded_deg_s"] is None
     assert told["scale_factor"]["scale_factor"] == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_threshold_that_noise_leaves_open_has_no_end() -> None:
+    found = least_seen([Answer(0.5, 0.5, 0.1), Answer(1.0, 0.6, 0.15)], Criteria())
+    assert found is not None
+    assert bracketed({"above_deg_h": found.above, "below_deg_h": found.below}) == "within noise"
