@@ -11,6 +11,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.fleet.constants import LEAST_UNITS, FleetConstants, UnitConstants, fleet_constants
 from fogml.fleet.diagnosis import RULES, line_diagnosis
+from fogml.fleet.manifest import JOBS
 from fogml.fleet.shares import discoveries
 from fogml.fleet.tasks import DONE
 from fogml.intervals import SIGMA_PER_MEDIAN
@@ -28,7 +29,7 @@ _TREND_LEVEL = 0.01
 def fleet_json(outcomes: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]:
     """What the units tell together."""
     units = [_unit(outcome) for outcome in outcomes]
-    judged = [unit for unit in units if unit["after"] is not None]
+    judged = judged_once(units)
     constants = _constants(outcomes)
     values: dict[str, Any] = {
         "schema": FLEET_SCHEMA,
@@ -80,6 +81,19 @@ def _unit(outcome: Mapping[str, Any]) -> dict[str, Any]:
         "effects": list(found.get("effects", ())),
         "notes": list(found.get("notes", ())),
     }
+
+
+def judged_once(units: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Units with figures, each once: by a drift model, ``train`` before ``compare``; by twins where none is.
+
+    What a twin leaves of a recording is another figure than what a drift model leaves.
+    """
+    by_job = {
+        job: {label_of(unit): unit for unit in units if unit["after"] is not None and unit["job"] == job}
+        for job in JOBS
+    }
+    chosen = by_job["compare"] | by_job["train"] or by_job["diagnose"]
+    return [unit for unit in units if chosen.get(label_of(unit)) is unit]
 
 
 def label_of(unit: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from fogml.fleet.summary import label_of
+from fogml.fleet.summary import judged_once, label_of
 from fogml.numerals import number, plural
 from fogml.report import style
 from fogml.report.page import Drawing
@@ -25,7 +25,7 @@ height of 360 px to the figure."""
 
 def distribution(fleet: Mapping[str, Any]) -> Drawing:
     """Rms before and after of all units, as cumulated shares, with the median floor."""
-    judged = [unit for unit in fleet["units"] if unit["after"] is not None]
+    judged = judged_once(fleet["units"])
     figure = go.Figure()
     shares = 100.0 * (np.arange(len(judged)) + 0.5) / len(judged)
     for key, name, colour, dash in (
@@ -64,7 +64,7 @@ def distribution(fleet: Mapping[str, Any]) -> Drawing:
 
 def by_unit(fleet: Mapping[str, Any], order: Sequence[Mapping[str, Any]], outliers: set[str]) -> Drawing:
     """Rms before and after and the floor of each unit, in order of serial numbers."""
-    units = [unit for unit in order if unit["after"] is not None]
+    units = judged_once(order)
     labels = [label_of(unit) for unit in units]
     figure = go.Figure()
     for key, symbol, colour in (

@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 import plotly.graph_objects as go
 
-from fogml.fleet.summary import label_of, told_of
+from fogml.fleet.summary import judged_once, label_of, told_of
 from fogml.fleet.tasks import DONE
 from fogml.numerals import MISSING, averages, in_order_of_serial, listed, number, percent, plural
 from fogml.report import style
@@ -39,7 +39,6 @@ def fleet_page(fleet: Mapping[str, Any], name: str = "fleet", batch: str | None 
         Page of the batch of its acceptance reports, if there is one.
     """
     order = sorted(fleet["units"], key=lambda unit: in_order_of_serial(label_of(unit)))
-    judged = [unit for unit in order if unit["after"] is not None]
     outliers = {item["unit"] for item in fleet["outliers"]}
     return render(
         "fleet.html",
@@ -47,8 +46,8 @@ def fleet_page(fleet: Mapping[str, Any], name: str = "fleet", batch: str | None 
         name=name,
         verdict=_verdict(fleet),
         tiles=_tiles(fleet),
-        distribution=distribution(fleet) if judged else None,
-        by_unit=by_unit(fleet, order, outliers) if judged else None,
+        distribution=distribution(fleet) if fleet["distribution"]["after"] else None,
+        by_unit=by_unit(fleet, order, outliers) if fleet["distribution"]["after"] else None,
         constants=constants(fleet) if "constants" in fleet else None,
         trends=_trends(fleet) if "constants" in fleet else None,
         outliers=[(item["unit"], item["why"]) for item in fleet["outliers"]],
@@ -79,18 +78,19 @@ def _line(fleet: Mapping[str, Any]) -> dict[str, Any] | None:
 
 def _verdict(fleet: Mapping[str, Any]) -> list[str]:
     done, failed = fleet["counts"].get("done", 0), fleet["counts"].get("failed", 0)
+    what = "unit" if len(set(map(label_of, fleet["units"]))) == len(fleet["units"]) else "job"
     sentences = []
     before, after = fleet["distribution"]["before"], fleet["distribution"]["after"]
     if before:
         sentences.append(
-            f"{plural(done, 'unit')} done; the median unit goes from {number(before['median'])} to "
+            f"{plural(done, what)} done; the median unit goes from {number(before['median'])} to "
             f"{number(after['median'])} deg/h rms ({_over(fleet)}), over a floor of "
             f"{number(fleet['distribution']['floor']['median'])} deg/h."
         )
     else:
-        sentences.append(f"{plural(done, 'unit')} done.")
+        sentences.append(f"{plural(done, what)} done.")
     if failed:
-        sentences.append(f"{plural(failed, 'unit')} could not be done.")
+        sentences.append(f"{plural(failed, what)} could not be done.")
     again = {item["unit"] for item in fleet["again"]}
     if again:
         sentences.append(f"{plural(len(again), 'unit needs', 'units need')} another run.")
@@ -98,7 +98,7 @@ def _verdict(fleet: Mapping[str, Any]) -> list[str]:
 
 
 def _over(fleet: Mapping[str, Any]) -> str:
-    times = {unit["averaging_s"] for unit in fleet["units"] if unit["averaging_s"]}
+    times = {unit["averaging_s"] for unit in judged_once(fleet["units"])}
     return averages(times.pop()) if len(times) == 1 else "averages"
 
 
@@ -108,7 +108,7 @@ def _tiles(fleet: Mapping[str, Any]) -> list[Tile]:
     tiles = [
         Tile(
             "Units",
-            str(len(fleet["units"])),
+            str(len(set(map(label_of, fleet["units"])))),
             "",
             f"{failed} failed" if failed else "all done",
             "missed" if failed else "",

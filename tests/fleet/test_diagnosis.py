@@ -110,3 +110,29 @@ def test_a_diagnosis_becomes_what_the_fleet_wants() -> None:
     assert [one["effect"] for one in told["causes"]] == [one.effect for one in found.found]
     assert told["covariates"] == {"coil_lot": "B"}
     line_diagnosis(["FOG-1"], [told])
+
+
+def test_a_unit_of_several_jobs_counts_once_and_by_its_model() -> None:
+    """The median of seven rms of models, whatever else a manifest asks of the units."""
+
+    def outcome(number: int, job: str, after: float) -> dict[str, Any]:
+        worst = {"run": "b.csv", "averaging_s": 100.0, "before": 9.0, "after": after, "floor": 0.1}
+        about = {
+            "unit": f"F{number}",
+            "axis": "x",
+            "job": job,
+            "folder": f"F{number}-{job}",
+            "status": "done",
+        }
+        return {**about, "found": {"worst": worst}}
+
+    rms = [0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+    jobs = (("train", 0.0), ("compare", 0.0625), ("diagnose", 7.0))
+    outcomes = [outcome(n, job, own + more) for n, own in enumerate(rms) for job, more in jobs]
+    values = fleet_json(outcomes, {})
+    assert values["distribution"]["after"]["median"] == 1.2 and not values["outliers"]
+    assert "21 jobs done; the median unit goes from 9.00 to 1.20 deg/h" in fleet_page(values)
+    # Where a unit was only compared, or all were only diagnosed, these are their figures.
+    compared = fleet_json([outcomes[1], *outcomes[3:]], {})["distribution"]["after"]
+    assert compared["least"] == 0.9625 and compared["median"] == 1.2
+    assert fleet_json(outcomes[2::3], {})["distribution"]["after"]["median"] == 8.2
