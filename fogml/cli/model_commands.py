@@ -178,6 +178,7 @@ class ExportJobSettings(Settings):
         spread=True,
         **options.RUN,
     )
+    repair: options.Repair = False
     out: options.Folder = "export-results"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -188,11 +189,12 @@ def _training_runs(
 
     if not settings.train:
         return []
+    read = partial(open_runs, settings.train, terminal, repair=settings.repair)
     try:
-        return open_runs(settings.train, terminal)
+        return read()
     except SeveralAxes:
         axes = dict.fromkeys(model.card_.axis for model in models)
-        return [run for axis in axes for run in open_runs(settings.train, terminal, axis=axis)]
+        return [run for axis in axes for run in read(axis=axis)]
 
 
 def _check_form(settings: ExportJobSettings, models: int) -> None:

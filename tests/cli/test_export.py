@@ -47,6 +47,18 @@ def test_the_configuration_gives_the_same_files(invoke, model, tmp_path):
     assert {path.name: path.read_bytes() for path in out.iterdir()} == first
 
 
+def test_training_runs_are_repaired_as_they_were_to_train(invoke, invoke_json, run_files, tmp_path):
+    train, test = run_files
+    rows = train.read_text().splitlines()
+    time, _, temperature = rows[40].split(",")
+    train.write_text("\n".join([*rows[:40], f"{time},nan,{temperature}", *rows[41:]]))
+    quick = ("--model", "polynomial", "--features", "T", "--repair", "-o", tmp_path / "out")
+    invoke("train", train, "--test", test, *quick)
+    arguments = ("export", tmp_path / "out", "--to", "json", "--train", train, "-o", tmp_path / "small")
+    assert "--repair drops the rows" in invoke(*arguments, status=2).stderr
+    assert invoke_json(*arguments, "--repair")["accuracy"]["on"] == "training folds"
+
+
 def test_training_runs_prune_and_judge(invoke_json, model, run_files, tmp_path):
     arguments = ("--to", "json", "--bytes", "30", "--train", run_files[0], "-o", tmp_path / "small")
     values = invoke_json("export", model, *arguments)
