@@ -65,7 +65,7 @@ def _compare(
         raise InputError("give test runs after --test, or --leave-one-out without --test")
     train_runs, test_runs = split_runs(settings, terminal)
     check((*train_runs, *test_runs))
-    noise = noise_run(settings, terminal)
+    noise = noise_run(settings, terminal, train_runs)
     fits = len(makers) * (1 if test_runs else len(train_runs) + 1)
     with terminal.work("comparing", total=fits) as work:
         begun: list[str] = []

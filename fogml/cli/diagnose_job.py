@@ -113,7 +113,7 @@ def diagnose_and_write(
         runs = open_runs(settings.runs, terminal, repair=settings.repair, beside=settings.held_out)
         held_out = open_runs(settings.held_out, terminal, repair=settings.repair, beside=settings.runs)
         check((*runs, *held_out))
-        noise = open_noise(settings.noise, terminal, repair=settings.repair)
+        noise = open_noise(settings.noise, terminal, (*runs, *held_out), repair=settings.repair)
         recorded, kept_back = runs, held_out
         column = _column(settings, model, runs, held_out, terminal)
         if column is not None:

@@ -51,7 +51,7 @@ def write_report(
         runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
         model = model_of()
         check(runs)
-        noise = open_noise(settings.noise, terminal, repair=settings.repair, axis=settings.axis)
+        noise = open_noise(settings.noise, terminal, runs, repair=settings.repair, axis=settings.axis)
         with terminal.work("testing"):
             return acceptance_json(
                 runs,

@@ -13,7 +13,7 @@ from fogml.cli.given import load
 from fogml.cli.options import Repairing
 from fogml.cli.settings import SHIPPED, Settings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError
+from fogml.errors import InputError, listed
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
 from fogml.runs.findings import DEAD, FIRST_OF_ALL
@@ -148,13 +148,35 @@ def open_runs(
 
 
 def open_noise(
-    path: str | None, terminal: Terminal, *, repair: Repairing = False, axis: str | None = None
+    path: str | None,
+    terminal: Terminal,
+    of: Sequence[Run],
+    *,
+    repair: Repairing = False,
+    axis: str | None = None,
+    any_unit: bool = False,
 ) -> Run | None:
-    """The static run that tells a unit's noise, where one is named; findings are noted on stderr."""
+    """The static run that tells the noise of the unit of other runs, where one is named.
+
+    Findings are noted on stderr, and so is that it is of another unit or axis, where that is allowed.
+
+    Raises
+    ------
+    InputError
+        If it is of another unit or axis, and any is not allowed.
+    """
     if path is None:
         return None
     run = open_run(path, repair=repair, axis=axis)
     note_findings([run], terminal)
+    for fact in ("unit", "axis"):
+        own = getattr(run.facts, fact)
+        others = sorted({str(stated) for one in of if (stated := getattr(one.facts, fact))})
+        if own and others and str(own) not in others:
+            told = f"{run.name}: a static run of {fact} '{own}', beside runs of '{listed(others, 3)}'"
+            if not any_unit:
+                raise InputError(f"{told}; --noise takes one of the same {fact}")
+            terminal.note(told)
     return run
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -73,9 +74,18 @@ def split_runs(settings: TrainSettings | CompareSettings, terminal: Terminal) ->
     return train_runs, test_runs
 
 
-def noise_run(settings: TrainSettings | CompareSettings, terminal: Terminal) -> Run | None:
+def noise_run(
+    settings: TrainSettings | CompareSettings, terminal: Terminal, train_runs: Sequence[Run]
+) -> Run | None:
     """The static run that makes the floor, read and checked; None where none is named."""
-    run = open_noise(settings.noise, terminal, repair=settings.repair, axis=settings.axis)
+    run = open_noise(
+        settings.noise,
+        terminal,
+        train_runs,
+        repair=settings.repair,
+        axis=settings.axis,
+        any_unit=settings.any_unit,
+    )
     if run is not None:
         from fogml.validation.floors import check_noise_run
 
@@ -97,7 +107,7 @@ def fit_and_judge(
         for trained in train_runs
         if len(test) == len(trained) and test.hash == trained.hash
     ]
-    noise = noise_run(settings, terminal)
+    noise = noise_run(settings, terminal, train_runs)
     with terminal.work(f"fitting {settings.model}") as work:
         if settings.train_again:
             from fogml.validation.index_search import train_until_index

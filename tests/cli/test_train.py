@@ -72,6 +72,22 @@ def test_a_faulty_noise_run_is_repaired_as_the_others_are(invoke, invoke_json, r
     assert invoke_json(*arguments, "--repair")["test"][0]["floor_source"].endswith("noise.csv")
 
 
+@pytest.mark.parametrize("fact", ["unit", "axis"])
+def test_a_noise_run_of_another_unit_is_refused_unless_any_is_allowed(invoke, run_files, tmp_path, fact):
+    train, test = run_files
+    noise = tmp_path / "noise.csv"
+    noise.write_text(csv_text(7))
+    noise.with_suffix(".yaml").write_text(f"{fact}: another\n")
+    given = ("--test", test, *QUICK, "--noise", noise, "-o", tmp_path / "out")
+    told = (
+        f"noise.csv: a static run of {fact} 'another', beside runs of '{'FOG-1' if fact == 'unit' else 'x'}'"
+    )
+    assert told in invoke("train", train, *given, status=2).stderr
+    assert told in invoke("train", train, *given, "--any-unit").stderr
+    report = ("lab", "acceptance", train, "--noise", noise)
+    assert f"{told}; --noise takes one of the same {fact}" in invoke(*report, status=2).stderr
+
+
 def test_an_unmet_design_index_is_status_1_and_everything_is_written(invoke, run_files, tmp_path):
     train, test = run_files
     out = tmp_path / "out"
