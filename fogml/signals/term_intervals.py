@@ -25,6 +25,8 @@ _NEAR = 4.0
 """Standard errors from which on a bound is not felt: one run in 30000."""
 _SAME = 0.02
 """Standard errors by which ends are not looked for again: as well as the draws tell."""
+_TOLD = 1e-3
+"""Standard errors to which a root is found."""
 _FLAT = 1e-9
 """Least information of a direction, of 1 along each term: what is less has no end anyway."""
 
@@ -65,9 +67,9 @@ def term_interval(search: NoiseSearch, name: str, level: float) -> tuple[float, 
         information = model.information(there, search.excess)
         return allowed_root(information, there.coefficients, place, direction, level)
 
-    def end(limit: float, direction: float, most: float) -> float:
+    def end(limit: float, direction: float, most: float, reach: float) -> float:
         """Where the root is the most, from the best value on; at the limit if it is nowhere."""
-        near, at_near, reach = value, -most, 1.1 * scale
+        near, at_near = value, -most
         while True:
             far = value + direction * reach
             if (far - limit) * direction >= 0.0:
@@ -88,9 +90,11 @@ def term_interval(search: NoiseSearch, name: str, level: float) -> tuple[float, 
 
     def settled(limit: float, direction: float, most: float) -> float:
         """The end, with what is allowed there."""
-        found = end(limit, direction, most)
+        found = end(limit, direction, most, 1.1 * scale)
         there = allowed(direction)
-        return found if abs(there - most) < _SAME else end(limit, direction, there)
+        if abs(there - most) < _SAME:
+            return found
+        return end(limit, direction, there, 1.1 * abs(found - value) * there / most)
 
     upper = settled(value + 1e12 * max(scale, value), 1.0, alone)
     fits.clear()
@@ -145,7 +149,7 @@ def allowed_root(
     off = np.sqrt(np.maximum(held - loss, 0.0)) * np.sign(truth[at] - found) * direction
     # The same draws without bounds, of which the quantile is known.
     free = np.linalg.inv(frame)[at] / errors[at] @ noise * -direction
-    return alone + float(np.quantile(off, tail) - np.quantile(free, tail))
+    return max(alone + float(np.quantile(off, tail) - np.quantile(free, tail)), _TOLD)
 
 
 def _bounded(
@@ -185,6 +189,6 @@ def _crossing(
             b, at_b, at_a = c, at_c, 0.5 * at_a
         else:
             a, at_a, b, at_b = b, at_b, c, at_c
-        if abs(b - a) <= tolerance or abs(at_c) <= 1e-3:
+        if abs(b - a) <= tolerance or abs(at_c) <= _TOLD:
             return c
     return c
