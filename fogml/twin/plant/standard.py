@@ -169,6 +169,7 @@ def _full(c: ThermalConstants, coil_nodes: int, order: int) -> ThermalNetwork:
 
     unit = c.case_capacity + c.coil_capacity + c.hub_capacity + c.electronics_capacity
     to_plate = c.plate_share / (c.case / unit + abs(c.plate - c.case) / c.plate_capacity)
+    to_plate = to_plate if order >= 6 else 0.0
     drawn = to_plate * (c.plate - c.case)
     links["T_plate", "T_case"] = to_plate
     links[AIR, "T_case"] = (unit + drawn) / c.case
