@@ -36,6 +36,7 @@ SEGMENTS = ("before", "turn", "after")
 _NEEDED = ("state", "tilt", "rate")
 _ANGLE_UNITS = {"deg": 1.0, "rad": 180.0 / np.pi}
 _SAME_ANGLE_DEG = 1e-6
+_MARK = 40  # characters of a mark that are told of
 
 
 def read_measurements(path: str | Path, state_angles_deg: Sequence[float] | None = None) -> TableMeasurements:
@@ -181,8 +182,15 @@ def _segments(path: Path, table: RawTable, cell: str) -> NDArray[np.str_]:
         raw = dialect.source.open()
         with io.TextIOWrapper(raw, encoding=dialect.encoding, errors="replace", newline="") as file:
             lines = csv.reader(islice(file, dialect.skipped_lines, None), delimiter=dialect.separator)
-            rows = [row for row in lines if any(field.strip() for field in row)]
-        marks = np.array([row[place].strip().lower() if place < len(row) else "" for row in rows])
+            try:
+                rows = [row for row in lines if any(field.strip() for field in row)]
+            except csv.Error as error:
+                raise InputError(
+                    f"{table.file}, line {dialect.skipped_lines + lines.line_num}: not readable as CSV ({error}); "
+                    "is a quotation mark not closed there?"
+                ) from None
+        # One long text would make all of them as long.
+        marks = np.array([row[place].strip().lower()[:_MARK] if place < len(row) else "" for row in rows])
     elif source.kind == "parquet":
         marks = np.char.lower(np.char.strip(parquet_marks(path, cell)))
     else:

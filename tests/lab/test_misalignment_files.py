@@ -110,6 +110,7 @@ def test_a_run_of_samples_with_noise(tmp_path: Path) -> None:
             "column 'rate', line .*missing or not finite",
         ),
         (lambda t: t.replace(",turn,", ",spin,", 1), "'spin' is no segment"),
+        (lambda t: t.replace(",turn,", f",{'x' * 200_000},", 1), "line 3: not readable as CSV"),
         (lambda t: t.replace("\n3,", "\n1,"), "no turns in state 3"),
     ],
 )
