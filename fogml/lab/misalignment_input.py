@@ -185,9 +185,10 @@ def _segments(path: Path, table: RawTable, cell: str) -> NDArray[np.str_]:
             try:
                 rows = [row for row in lines if any(field.strip() for field in row)]
             except csv.Error as error:
+                line = dialect.skipped_lines + lines.line_num
                 raise InputError(
-                    f"{table.file}, line {dialect.skipped_lines + lines.line_num}: not readable as CSV ({error}); "
-                    "is a quotation mark not closed there?"
+                    f"{table.file}, line {line}: not readable as CSV ({error}); is a quotation mark not "
+                    "closed there?"
                 ) from None
         # One long text would make all of them as long.
         marks = np.array([row[place].strip().lower()[:_MARK] if place < len(row) else "" for row in rows])
