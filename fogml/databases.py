@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 _ANSWER_S = 10
 """Time that a database has to answer when it is opened [s]."""
+_SECRETS = frozenset(("password", "passwd", "pwd", "sslpassword"))
 
 
 def parse_url(url: str, given_as: str = "--storage") -> URL:
@@ -49,16 +50,20 @@ def engine_settings(url: URL) -> dict[str, Any]:
 
 def shown_url(url: str) -> str:
     """A URL without its password, for messages."""
-    from sqlalchemy.engine import make_url
-
-    return make_url(url).render_as_string(hide_password=True)
+    return _without_secrets(url).render_as_string(hide_password=True)
 
 
 def without_password(url: str) -> str:
     """A URL as it may be written to a file: libpq finds the password in PGPASSWORD or ~/.pgpass."""
+    return _without_secrets(url)._replace(password=None).render_as_string(hide_password=False)
+
+
+def _without_secrets(url: str) -> URL:
+    """A URL without the passwords that drivers also take among its options."""
     from sqlalchemy.engine import make_url
 
-    return make_url(url)._replace(password=None).render_as_string(hide_password=False)
+    parsed = make_url(url)
+    return parsed.difference_update_query([name for name in parsed.query if name.lower() in _SECRETS])
 
 
 def told_by(error: BaseException) -> str:

@@ -181,7 +181,7 @@ def _owner(told: str) -> dict[str, Any]:
         values = json.loads(told)
         started = str(values.get("started", ""))
         return {"pid": int(values["pid"]), "host": str(values["host"]), "started": started}
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         return {}
 
 

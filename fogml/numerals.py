@@ -107,9 +107,9 @@ def to_error(value: float, error: float | None, most: int = 4) -> str:
 
 def with_error(value: float, se: float) -> str:
     """A value with its standard error, both to the error's second figure; bare where there is none."""
-    value = 0.0 if abs(value) < 0.005 * se else value
     if not (math.isfinite(se) and se > 0.0):
         return number(value)
+    value = 0.0 if abs(value) < 0.005 * se else value
     places = 1 - math.floor(math.log10(se))
     if places < -2 or places > 6:
         return f"{number(value)} ± {number(se, 2)}"

@@ -197,7 +197,7 @@ _BLANK = 0x2800
 
 
 def braille(values: FloatArray, width: int = 60, height: int = 3) -> list[str]:
-    """A curve as lines of text, highest values first.
+    """A curve as lines of text, highest values first, on a scale that holds zero.
 
     Each column of dots spans from the least to the greatest value of its part of the curve.
 

@@ -178,7 +178,7 @@ def process_is_alive(pid: int, started: str) -> bool:
     """Whether a process of this machine still runs, and is the one that was meant."""
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
+    except (ProcessLookupError, OverflowError):  # no such number
         return False
     except PermissionError:
         pass

@@ -7,7 +7,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fogml.numerals import number_text, percent, short
+from fogml.numerals import number_text, percent, short, with_error
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
@@ -20,6 +20,11 @@ def test_a_short_number_is_right_to_its_digits_and_has_no_power_of_ten(value, si
     text = short(sign * value, digits)
     assert "e" not in text
     assert abs(float(text) - sign * value) <= 0.501 * 10.0 ** (math.floor(math.log10(value)) + 1 - digits)
+
+
+def test_a_value_without_a_finite_error_stands_alone():
+    assert [with_error(3.2, se) for se in (math.inf, math.nan, 0.0)] == ["3.20"] * 3
+    assert with_error(0.001, 1.5) == "0.0 ± 1.5"
 
 
 def test_no_number_is_a_dash():

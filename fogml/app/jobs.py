@@ -58,6 +58,8 @@ def begin(folder: Path) -> None:
         os.write(told, b"1" if _claim(folder, process) else b"0")
         return
     os.setsid()
+    # Should the other fail, the pipe has an end.
+    os.close(told)
     if os.read(heard, 1) == b"1":
         run(folder)
 
@@ -113,11 +115,12 @@ class Jobs:
 
     def names(self) -> list[str]:
         """Numbers of the jobs, in the order in which they were asked for."""
-        return sorted(p.name for p in self.folder.iterdir() if p.name.isdigit() and (p / "job.json").exists())
+        held = [p.name for p in self.folder.iterdir() if p.name.isdecimal() and (p / "job.json").exists()]
+        return sorted(held, key=int)
 
     def add(self, words_of: Callable[[str], list[str]]) -> str:
         """A new job; `words_of` gives its command from the folder of its results. Its number."""
-        number = max([int(name) for name in os.listdir(self.folder) if name.isdigit()], default=0) + 1
+        number = max([int(name) for name in os.listdir(self.folder) if name.isdecimal()], default=0) + 1
         while True:
             name = f"{number:04d}"
             try:

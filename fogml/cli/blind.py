@@ -131,7 +131,7 @@ class RunSettings(SuiteSettings):
     def part(self) -> tuple[int, int]:
         """The shard as numbers."""
         i, slash, n = self.shard.partition("/")
-        if not (slash and i.strip().isdigit() and n.strip().isdigit()):
+        if not (slash and i.strip().isdecimal() and n.strip().isdecimal()):
             raise InputError(f"shard '{self.shard}': write I/N, e.g. 2/8")
         return int(i), int(n)
 

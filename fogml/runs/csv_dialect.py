@@ -228,7 +228,7 @@ def _fractions(rows: Sequence[Sequence[str]], width: int, place: int) -> int | N
     """The first row's part of a second [ns] where a comma before it separates fields too; else None."""
     full = [row for row in rows if len(row) >= width]
     behind = [row[place + 1].strip() for row in full if len(row) > width]
-    sizes = {len(field) if field.isdigit() else 0 for field in behind}
+    sizes = {len(field) if field.isdecimal() else 0 for field in behind}
     if len(behind) < len(full) or len(sizes) != 1 or not 0 < (size := sizes.pop()) <= 9:
         return None
     if not all(re.search(r":\d\d\Z", row[place].strip()) for row in full):

@@ -34,7 +34,8 @@ class Exchange(Pictured):
         ----------
         frame
             Columns called as in a run's file, ``gyro`` or ``gyro [deg/s]``; without a unit they are in the
-            run format's. An index of times becomes ``time`` where there is no such column.
+            run format's. An index of times, not one that counts rows, becomes ``time`` where there is no
+            such column.
         name
             Name of the run.
         facts
@@ -43,8 +44,8 @@ class Exchange(Pictured):
         Raises
         ------
         InputError
-            If a column is named twice, or in a unit that the run format does not take, or its values are
-            no numbers.
+            If a column is named twice, or in a unit that the run format does not take, its values are no
+            numbers, or there are no times.
         """
         columns: dict[str, Any] = {}
         unit_of_gyro = "deg/h"
@@ -60,6 +61,11 @@ class Exchange(Pictured):
                 unit_of_gyro = "count"
             columns[column] = values
         if "time" not in columns:
+            if type(frame.index).__name__ == "RangeIndex":
+                raise InputError(
+                    f"{name}: no column 'time', and the index counts rows; add the times in seconds as a "
+                    "column 'time' or as the index"
+                )
             index = frame.index.to_numpy()
             seconds = index / np.timedelta64(1, "s") if index.dtype.kind == "m" else index
             columns = {"time": seconds, **columns}

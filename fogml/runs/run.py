@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -315,14 +315,15 @@ class Run(Exchange):
 
     def with_facts(self, facts: Facts) -> Run:
         """The run with other set-up facts."""
-        return Run.derived(self.name, self.columns, facts, self.gyro_unit, self.findings)
+        return self._with(self.columns, facts=facts)
 
-    def _with(self, columns: Mapping[str, FloatArray]) -> Run:
-        run = Run.derived(self.name, columns, self.facts, self.gyro_unit, self.findings)
+    def _with(self, columns: Mapping[str, FloatArray], **others: Any) -> Run:
+        """The run with other columns, `facts` or `findings`, read by the same rule."""
+        held = {"facts": self.facts, "gyro_unit": self.gyro_unit, "findings": self.findings, **others}
+        run = Run.derived(self.name, columns, **held)
         run.__dict__["_rule"] = self._rule
         return run
 
     def with_findings(self, findings: Iterable[Finding]) -> Run:
         """The run with more findings; those come first that make every figure wrong."""
-        found = tuple(first_of_all((*self.findings, *findings)))
-        return Run.derived(self.name, self.columns, self.facts, self.gyro_unit, found)
+        return self._with(self.columns, findings=tuple(first_of_all((*self.findings, *findings))))

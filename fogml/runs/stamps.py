@@ -99,7 +99,11 @@ class StampForm:
         year = np.where(year < 100, year + 2000, year)
         wrong = (month < 1) | (month > 12) | (day < 1) | (day > 31) | (year < 1900) | (year > 2200)
         months = (np.where(wrong, 1970, year) - 1970) * 12 + np.where(wrong, 1, month) - 1
-        first = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
+        first, after = (
+            (months + more).astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
+            for more in (0, 1)
+        )
+        wrong |= day > after - first
         return first + np.where(wrong, 1, day) - 1, wrong
 
 

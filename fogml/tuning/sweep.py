@@ -72,6 +72,8 @@ def study_json(
     trials = sorted(finished, key=place_of)
     place = {trial.number: index for index, trial in enumerate(trials)}
     best = winner(trials)
+    # Means of held-out parts are told where these are whole runs.
+    by_run = any(best.user_attrs.get("fold_means", ()))
     chosen = dict(_trial(best))
     chosen["against"] = against_references(trials, best)
     chosen["command"] = command_line(best, runs, test, seed, averaging_s)
@@ -82,7 +84,7 @@ def study_json(
         "study": study.study_name,
         "storage": shown(storage),
         "objectives": [{"name": name, "unit": OBJECTIVES[name]} for name in objectives],
-        "folds": "runs" if len(runs) > 1 else "blocks of time",
+        "folds": "runs" if by_run else "blocks of time",
         "held_out_averaging_s": best.user_attrs.get("averaging_s"),
         "train": [Path(run).name for run in runs],
         "test": [Path(run).name for run in test],

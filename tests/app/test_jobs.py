@@ -66,6 +66,21 @@ def test_jobs_wait_for_each_other_and_are_cancelled(tmp_path: Path) -> None:
     assert jobs.told(first)["status"] == 143
 
 
+def test_a_job_that_can_not_be_begun_leaves_no_process(tmp_path: Path) -> None:
+    """The process made for it holds the pipe of stderr as long as it is there."""
+    command = [sys.executable, "-m", "fogml.app.jobs", str(tmp_path / "no such folder")]
+    assert subprocess.run(command, stderr=subprocess.PIPE, timeout=30).returncode != 0
+
+
+def test_jobs_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path, 0)
+    for name in ("9999", "²"):
+        (jobs.folder / name).mkdir()
+        (jobs.folder / name / "job.json").write_text('{"words": ["docs"], "made": ""}')
+    assert jobs.add(lambda results: ["docs"]) == "10000"
+    assert jobs.names() == ["9999", "10000"]
+
+
 def test_a_job_whose_processes_are_gone_has_failed(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path, 2)
     name = jobs.add(lambda results: ENDLESS)

@@ -248,6 +248,8 @@ def test_the_next_writer_in_a_folder_removes_the_locks_of_dead_processes_alone(t
         ".out+F-1.lock": gone,
         ".far.lock": gone | {"host": "elsewhere"},
         ".other.lock": [1],
+        ".endless.lock": gone | {"pid": float("inf")},
+        ".no-number.lock": gone | {"pid": 10**30},
         "kept.lock": gone,
     }
     for name, told in texts.items():
@@ -255,7 +257,10 @@ def test_the_next_writer_in_a_folder_removes_the_locks_of_dead_processes_alone(t
     with sole_writer(tmp_path / "mine"), whole_file(tmp_path / "run.csv") as partial:
         partial.write_text("")
         assert (tmp_path / ".mine.lock").exists()
-    assert {path.name for path in tmp_path.iterdir()} == {*texts, "run.csv"} - {".out+F-1.lock"}
+    assert {path.name for path in tmp_path.iterdir()} == {*texts, "run.csv"} - {
+        ".out+F-1.lock",
+        ".no-number.lock",
+    }
 
 
 def test_a_folder_to_fill_is_gone_where_nothing_came_into_it(tmp_path):

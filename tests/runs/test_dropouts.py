@@ -7,7 +7,8 @@ import pytest
 
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
-from fogml.runs.dropouts import RULE, last_reading, read_thermometer
+from fogml.runs.dropouts import RULE, DropoutRule, last_reading, read_thermometer
+from fogml.runs.facts import Facts
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
@@ -127,3 +128,12 @@ def test_a_single_reading_after_others_is_judged_by_them():
         found = read_thermometer(time[50:], np.array([shown]), before=before)
         assert (found.bad if found.bad is None else found.bad.tolist()) == bad
         assert found.values.tolist() == [25.0 if bad else shown]
+
+
+def test_other_facts_and_findings_leave_the_rule_as_it_is():
+    time = np.arange(100.0)
+    run = Run.from_columns(time=time, gyro=np.sin(time), T=20.0 + 3.0 * (time == 50.0))
+    run = run.read_by(DropoutRule(jump_degC=1.0, rate_degC_s=0.01, noise_sigma=0.0))
+    assert run.temperature()[50] == 20.0
+    assert run.with_facts(Facts(unit="F")).temperature()[50] == 20.0
+    assert run.with_findings([]).temperature()[50] == 20.0

@@ -54,8 +54,9 @@ def test_an_index_of_times_is_the_time(index: pd.Index) -> None:
     [
         ({"gyro [furlong]": [1.0, 2.0]}, "column 'gyro' has unit 'furlong', not accepted"),
         ({"gyro": [1.0, 2.0], "gyro [deg/s]": [1.0, 2.0]}, "column 'gyro' is there twice"),
-        ({"T": [1.0, 2.0]}, "no column 'gyro'"),
-        ({"gyro": ["a", "b"]}, "gyro"),
+        ({"time": [0.0, 1.0], "T": [1.0, 2.0]}, "no column 'gyro'"),
+        ({"gyro": [1.0, 2.0]}, "no column 'time', and the index counts rows"),
+        ({"time": [0.0, 1.0], "gyro": ["a", "b"]}, "gyro"),
         ({"time": [0.0, 0.0], "gyro": [1.0, 2.0]}, "time"),
     ],
 )

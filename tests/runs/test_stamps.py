@@ -45,6 +45,12 @@ def test_days_count_on_where_the_exact_reader_takes_over(tmp_path, monkeypatch):
     np.testing.assert_array_equal(times, 20.0 * np.arange(6000))
 
 
+def test_days_are_those_of_their_month():
+    texts = ["2024-02-28 12:00:00", "2024-02-29 12:00:00", "2024-02-30 12:00:00", "2024-04-31 12:00:00"]
+    found = StampClock(stamps_of([(0, texts)]), "file").seconds([arrow.array(texts)])
+    np.testing.assert_array_equal(found, [0.0, 86400.0, np.nan, np.nan])
+
+
 @pytest.mark.parametrize(
     ("date", "clock", "zone"),
     [("23-03-2026", "08:00:{:02d}", None), ("23-03-2026", "08:00:{:02d}+01:00", 0.0)],

@@ -28,6 +28,10 @@ def test_a_database_that_does_not_answer(tmp_path):
     assert "secret" not in str(told.value)
     assert "secret" not in shown(url)
     assert without_password(url) == url.replace(":secret", "")
+    # libpq takes it among the options, too.
+    option = "postgresql://somebody@host/studies?password=secret&application_name=x"
+    assert "secret" not in shown(option) + without_password(option)
+    assert "application_name=x" in without_password(option)
 
 
 @pytest.mark.parametrize("url", ["not a url", "nosuchdatabase://x/y"])

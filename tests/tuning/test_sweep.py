@@ -91,11 +91,11 @@ def test_a_sweep_killed_at_any_entry_of_its_journal_goes_on_bit_for_bit(tmp_path
         assert _told(run_sweep(plan(folder, **settings))) == expected
 
 
-def _told(study):
+def _told(study, objectives=("rms", "bytes")):
     """``sweep.json`` but for how many trials had to be tried again."""
     values = study_json(
         study,
-        objectives=["rms", "bytes"],
+        objectives=objectives,
         runs=["a.csv", "b.csv"],
         test=[],
         seed=0,
@@ -105,6 +105,13 @@ def _told(study):
     )
     del values["counts"]["retried"]
     return json.dumps(values)
+
+
+@pytest.mark.parametrize(("folds", "told"), [("time", "blocks of time"), ("auto", "runs")])
+def test_what_was_held_out_is_told_as_it_was_whatever_the_number_of_runs(tmp_path, folds, told):
+    space = {"features": ["T"], "models": ["polynomial"]}
+    study = run_sweep(plan(tmp_path, space=space, trials=1, folds=folds))
+    assert json.loads(_told(study, objectives=["rms"]))["folds"] == told
 
 
 def test_workers_of_one_place_leave_it_to_the_first(tmp_path):
