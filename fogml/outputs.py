@@ -8,6 +8,7 @@ dead process of this host left otherwise, the next writer removes, locks of outp
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import secrets
@@ -120,8 +121,14 @@ def whole_folder(path: str | Path, *, shared: bool = False) -> Iterator[Path]:
         if not real.exists():
             # In one step: on a full disk even a move may fail.
             real.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(staging.content, real)
-        elif home == real or not exchange_whole(staging.content, real):
+            try:
+                os.replace(staging.content, real)
+                return
+            except OSError as error:
+                # Another who shares it may have made it at this moment.
+                if not shared or error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                    raise
+        if shared or home == real or not exchange_whole(staging.content, real):
             staging.move_in(real)
 
 

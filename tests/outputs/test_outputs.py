@@ -291,6 +291,32 @@ def test_messages_name_the_output_and_not_where_it_lies_meanwhile(tmp_path, monk
         Path("input.csv").read_text()
 
 
+@pytest.mark.parametrize("moment", ["meanwhile", "at the end"])
+def test_a_shared_folder_that_another_made_first_stays_the_folder_it_is(tmp_path, monkeypatch, moment):
+    """An exchange would take away from under a third writer what that one has begun in it."""
+    out, replaced = tmp_path / "out", os.replace
+
+    def another():
+        out.mkdir()
+        (out / "theirs").write_text("1")
+
+    def replace(one, other):
+        if moment == "at the end" and not out.exists():
+            another()
+        replaced(one, other)
+
+    monkeypatch.setattr("fogml.outputs.os.replace", replace)
+    with whole_folder(out, shared=True) as folder:
+        (folder / "mine").write_text("2")
+        if moment == "meanwhile":
+            another()
+            there = out.stat().st_ino
+    if moment == "meanwhile":
+        assert out.stat().st_ino == there
+    assert {path.name: path.read_text() for path in out.iterdir()} == {"theirs": "1", "mine": "2"}
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
 @pytest.mark.parametrize("shared", [True, False])
 def test_places_that_are_links_or_the_present_folder(tmp_path, monkeypatch, shared):
     real = tmp_path / "real"
