@@ -82,7 +82,9 @@ def chosen_rows(table: LoggerTable, profile: TextLayout) -> LoggerTable:
             verb = "stands" if lost == 1 else "stand"
             message = f"{counted(lost, 'value')} of {quoted(str(source))} {verb} for none: interpolated"
             table = table.kept(slice(None), Finding("sentinel", message, column=name, row=row, count=lost))
-            table = replace(table, columns={**table.columns, source: _bridged(values, none)})
+            table = replace(
+                table, columns={**table.columns, source: _bridged(values, none, _clock(table, profile))}
+            )
         else:
             message = f"{counted(lost, 'row')} in which {quoted(str(source))} stands for none left out"
             table = table.kept(~none, Finding("rejected_rows", message, row=row, count=lost))
@@ -93,15 +95,22 @@ def _is_one_of(values: FloatArray, numbers: Sequence[float]) -> BoolArray:
     return large.each(lambda part: np.isin(part, numbers), values, kind=bool)
 
 
-def _bridged(values: FloatArray, none: BoolArray) -> FloatArray:
+def _clock(table: LoggerTable, profile: TextLayout) -> FloatArray:
+    """What tells how far rows are apart: the clock in any unit, the row's number where that goes back."""
+    time = table.seconds if profile.clock is None else table.columns[profile.clock]
+    is_clock = time is not None and all(np.all(steps > 0.0) for _, steps in large.differences(time))
+    return time if time is not None and is_clock else table.rows.astype(np.float64)
+
+
+def _bridged(values: FloatArray, none: BoolArray, at: FloatArray) -> FloatArray:
     """Values, in the place of those that are none the line from the one before to the one behind."""
     filled = large.each(np.copy, values)
     changes = np.flatnonzero(none[1:] != none[:-1]) + 1
     edges = np.concatenate([[0], changes, [len(values)]]).tolist()
     for first, end in pairwise(edges):
         if none[first]:
-            around = [at for at in (first - 1, end) if 0 <= at < len(values)]
-            filled[first:end] = np.interp(np.arange(first, end), around, values[around])
+            around = [place for place in (first - 1, end) if 0 <= place < len(values)]
+            filled[first:end] = np.interp(at[first:end], at[around], values[around])
     return filled
 
 

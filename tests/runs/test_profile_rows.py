@@ -76,6 +76,13 @@ def test_values_that_stand_for_none(read):
     (run,) = read(HEAD + COLUMNS, log(warm))
     np.testing.assert_allclose(run.columns["T"], WARM, atol=1e-12)
     assert [f.count for f in run.findings if f.code == "sentinel"] == [2]
+    # A line in time, also where rows are not evenly apart.
+    profile = (
+        "schema: fogml.import/1\ndescription: a bench\ncolumns:\n  time: {source: t, unit: s}\n"
+        "  gyro: {source: g, unit: dph}\n  T: {source: T, unit: degC, missing: [85]}\n"
+    )
+    (run,) = read(profile, "t,g,T\n0,1.5,20\n1,2.5,21\n2,1.25,85\n10,2.25,30\n11,1.75,31\n")
+    np.testing.assert_allclose(run.columns["T"], 20.0 + run.time)
     gyro = COLUMNS.replace("unit: dph", "unit: dph, missing: [3.5, 4.5]")
     (run,) = read(HEAD + gyro, log())
     assert len(run) == COUNT - 2
