@@ -20,6 +20,7 @@ FACTS_KEY = "fogml.facts"
 """Key of the set-up facts (JSON) in Parquet schema metadata, HDF5 attributes and MAT variables."""
 
 
+_GYROS = frozenset(("gyro", "gyro_x", "gyro_y", "gyro_z"))
 BLOCK_VALUES = 10_000_000
 """Numbers of a block at most, 80 MB; two blocks are held at once, and messages of robots have 45 columns."""
 
@@ -74,11 +75,14 @@ def embedded_facts(values: Mapping[str, Any], source: str) -> Facts | None:
 
 
 def wanted_cells(cells: Iterable[str], names: Collection[str] | None) -> list[str]:
-    """The header cells of time, gyro and the columns `names`; all of them for None."""
+    """The header cells of time, gyro and the columns `names`, without a gyro those of axes; all for None."""
+    held = {cell: parse_header(cell)[0] for cell in cells}
     if names is None:
-        return list(cells)
+        return list(held)
     wanted = {"time", "gyro", *names}
-    return [cell for cell in cells if parse_header(cell)[0] in wanted]
+    if not wanted & _GYROS & set(held.values()):
+        wanted |= _GYROS
+    return [cell for cell, name in held.items() if name in wanted]
 
 
 def choose_vectors(

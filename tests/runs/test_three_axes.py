@@ -10,6 +10,7 @@ from fogml.runs.reading import read_blocks, read_run
 from fogml.runs.run import Run
 from fogml.runs.three_axes import SeveralAxes
 from fogml.runs.writing import write_run
+from tests.runs.files import write_table
 
 ROWS = 40
 
@@ -57,6 +58,16 @@ def test_without_an_axis_the_file_says_what_it_holds(file):
     assert caught.value.axes == ("x", "y", "z")
     with pytest.raises(InputError, match="'w': one of x, y, z"):
         read_run(file(), axis="w")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_so_it_does_where_a_few_columns_are_asked_for(tmp_path, suffix):
+    columns = {"time [s]": np.arange(20.0), "gyro_y [deg/h]": np.arange(20.0), "T [degC]": np.arange(20.0)}
+    path = write_table(tmp_path / f"run{suffix}", columns)
+    with pytest.raises(SeveralAxes):
+        next(read_blocks(path, columns=["T"]))
+    with pytest.raises(InputError, match="no column 'gyro_x'; it holds y"):
+        next(read_blocks(path, columns=["T"], axis="x"))
 
 
 def test_facts_of_each_axis(file):
