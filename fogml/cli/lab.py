@@ -82,7 +82,7 @@ class RateSettings(Settings):
         0.5, "Share of the expected output that counts.", metavar="SHARE", gt=0.0, lt=1.0
     )
     dead: float = setting(0.1, "Share of the expected change that is dead.", metavar="SHARE", gt=0.0, lt=1.0)
-    range_error: float = setting(0.01, "Deviation that ends the range.", metavar="SHARE", gt=0.0, lt=1.0)
+    range_error: float = setting(0.01, "Shortfall that ends the range.", metavar="SHARE", gt=0.0, lt=1.0)
     small: float = setting(0.02, "Of the greatest rate: rates about zero.", metavar="SHARE", gt=0.0, le=1.0)
     repair: options.Repair = False
     out: options.FolderIfNamed = None

@@ -81,8 +81,13 @@ def coarse_fine(
     """Coarse and fine seek that together take a time [s], with the transfers and the turn between them."""
     coarse = replace(plain, dwell_s=coarse_dwell_s)
     start = plain.start_s + coarse.duration_s + plain.transfer_s
-    fine = replace(plain, start_s=start)
-    fine = _filling(fine, time_s - (start - plain.start_s))
+    spent = start - plain.start_s
+    if not spent < time_s:
+        raise InputError(
+            f"the coarse seek and the turn after it take {spent:g} of {time_s:g} s; stay shorter in its "
+            "positions, or longer in all"
+        )
+    fine = _filling(replace(plain, start_s=start), time_s - spent)
     if quiet_deg is None:
         quiet = quiet_azimuths(fine)
         if not quiet:

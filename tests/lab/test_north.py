@@ -328,3 +328,9 @@ def test_a_gyro_that_stands_still_shows_no_north_and_a_stuck_one_says_so() -> No
         noticed = one.with_findings(check_run(one))
         told = recorded_north_json(noticed, order_deg=Scheme().order_deg)["findings"]
         assert [finding["code"] for finding in told][:1] == codes
+
+
+def test_a_coarse_seek_that_takes_all_the_time_is_told_with_what_it_takes() -> None:
+    """Four positions of 6 s in the 20 s of four of 5 s."""
+    _, left_out = ways_of_equal_time(Scheme(dwell_s=5.0), coarse_dwell_s=6.0)
+    assert "take 24 of 20 s" in left_out["coarse-fine"]
