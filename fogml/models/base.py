@@ -108,7 +108,7 @@ def _check_finite(run: Run, values: FloatArray, what: str) -> None:
     if not finite.all():
         place = int(np.argmin(finite))
         raise InputError(
-            f"{run.name}, row {place + 1} (time {run.time[place]:.10g} s): the {what} is {values[place]}: "
+            f"{run.name}: at time {run.time[place]:.10g} s the {what} is {values[place]}: "
             "the model's numbers and the run's are too large for each other; train it again on such runs"
         )
 

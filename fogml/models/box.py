@@ -26,6 +26,11 @@ def learn_box(features: Features, atoms: Iterable[FloatArray]) -> None:
     """Set the features' box around values of their atoms in the training rows, each of shape (n, a).
 
     What lies beyond bounds is 0 in training rows and levels off by itself: its box is all that it can be.
+
+    Raises
+    ------
+    InputError
+        If a feature is larger than `LARGEST` there.
     """
     features.learn([(values, np.ones(len(values), dtype=np.bool_)) for values in atoms])
     spans = dict(features.box)
@@ -34,6 +39,18 @@ def learn_box(features: Features, atoms: Iterable[FloatArray]) -> None:
             most = most_beyond(*atom.bounds)
             spans[atom.text] = (-most, most)
     features.set_box(spans, slices_of(features))
+    digits = {text: np.log10(max(abs(low), abs(high), 1e-300)) for text, (low, high) in spans.items()}
+    for term in features.terms:
+        size = sum(power * digits[atom.text] for atom, power in term.factors)
+        if size > np.log10(LARGEST):
+            raise InputError(
+                f"feature {term.text} is as large as 1e{size:.0f} in the training runs, {LARGEST:g} at most "
+                "can be fitted to; take a lower power, or a share of the column, as 1e-6*power"
+            )
+
+
+LARGEST = 1e150
+"""Largest value of a feature that a fit is made to: its square is a number, too."""
 
 
 def slices_of(features: Features) -> SavedSlices | None:

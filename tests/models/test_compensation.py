@@ -159,3 +159,13 @@ def test_whether_model_and_run_belong_together(fact, trained, found, told):
     if trained and found and trained != found:
         with pytest.raises(InputError, match=f"use a model of this {fact}"):
             check_unit_and_axis(card, run, any_unit=False)
+
+
+def test_what_is_no_number_is_told_by_its_time_in_any_block(train):
+    """A row of a block is none of the file's."""
+    on = (np.arange(len(train)) >= 150).astype(np.float64)
+    run = train.with_columns(power=on)
+    model = make_model("polynomial", "T, power").fit(run)
+    model.regressor_.coef_, model.regressor_.intercept_ = np.array([0.0, 1e308]), 1e308
+    with pytest.raises(InputError, match=f": at time {run.time[150]:.10g} s the model's drift is inf"):
+        list(compensate_blocks(model, [run[:100], run[100:]]))

@@ -257,3 +257,11 @@ def test_a_sensor_stands_in_calls_of_several_arguments_too(train):
 
 
 EACH = ("lag({}, 600 s)", "play({}, 4 degC)", "play({}, 4 degC)^2")
+
+
+@pytest.mark.parametrize("name", ["polynomial", "mixed-effects", "rbf", "auto"])
+@pytest.mark.parametrize("text", ["T, power^20", "1e300*T_in, T_out"])
+def test_a_feature_too_large_to_be_squared_is_refused(train, name, text):
+    run = train.with_columns(power=1e17 + 0.0 * train.time)
+    with pytest.raises(InputError, match=r"feature \S+ is as large as 1e\d+ in the training runs"):
+        make_model(name, text).fit(run)
