@@ -285,14 +285,14 @@ def test_brain_floats_are_told(folder):
         load_model(edited(folder))
 
 
-def test_numbers_that_are_too_large_are_told_with_their_place(folder, train):
+def test_numbers_that_are_too_large_are_told_with_their_time(folder, train):
     arrays = {name: array.copy() for name, array in load_file(folder / "weights.safetensors").items()}
     arrays["coef"][2] = 1e308
     model = load_model(edited(folder, arrays=arrays))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for use in (model.predict, model.compensate, lambda run: list(compensate_blocks(model, [run]))):
-            with pytest.raises(InputError, match=r"^train, row \d+ \(time \d+ s\): the model's drift is"):
+            with pytest.raises(InputError, match=r"^train: at time \d+ s the model's drift is"):
                 use(train)
 
 
