@@ -65,7 +65,8 @@ def rows_of(
     replayer = Replayer(run)
     counts = np.bincount(row[usable], minlength=count).astype(np.float64)
     spread = (row_s**2 - step**2) / 12.0
-    samples = BySample(replace(replayer.recorded, coil=twin.coil), row, usable, counts, spread)
+    given = replace(replayer.recorded, coil=twin.coil, light=twin.light)
+    samples = BySample(given, row, usable, counts, spread)
     time = run.time[0] + row_s * np.arange(count) + 0.5 * (width - 1) * step
     even, readings, noise = _even(samples, time, twin, replayer, exact)
     smooth = at_points(time, {name: even.temperatures[name] for name in readings}, run.time, spread)

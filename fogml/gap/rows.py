@@ -243,7 +243,7 @@ class BySample:
         for name, course in at_points(even.time, new, self.recorded.time, self.spread).items():
             self.cache[id(new[name])] = new[name], course
         smooth = {name: self.cache[id(values)][1] for name, values in held.items()}
-        return replace(self.recorded.afresh(), temperatures=smooth, sensors={}, cache={}, coil=even.coil)
+        return replace(self.recorded.afresh(), temperatures=smooth, sensors={}, cache={})
 
 
 def slopes(rows: Rows, constants: Mapping[str, float]) -> dict[str, FloatArray]:

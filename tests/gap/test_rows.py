@@ -18,6 +18,7 @@ from fogml.gap.settings import Priors
 from fogml.gap.thermal_families import hidden_node
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.registry import effect
 from fogml.twin.twin_file import load_twin
 
 NOISE = NoiseModel(0.005, 0.0, 0.0)
@@ -132,3 +133,12 @@ def test_what_one_run_alone_records_keeps_its_place_beside_runs_that_do_not(poor
         own = both.by_run[1 if poor_first else 0]
         # Beside a run that records no machine a line may be one, which comes first.
         np.testing.assert_allclose(own[:, own.shape[1] - held.by_run[0].shape[1] :], held.by_run[0])
+
+
+def test_cross_talk_weighs_the_more_the_less_light_the_twin_has():
+    """0.05 dB for each degree off 25 degC."""
+    twin = load_twin("nominal").with_effect("light_power", 0.1, power_loss=0.05, power_slope=0.0)
+    rows = rows_of(_cycle(), twin, 600)
+    off = rows.of(rows.even.temperature("T_electronics")) - 25.0
+    told = rows.response(effect("electronic_crosstalk"), {"supply_ratio": 0.0})
+    np.testing.assert_allclose(told, off * 10.0 ** (0.005 * np.abs(off)), rtol=1e-12)
