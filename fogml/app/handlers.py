@@ -190,6 +190,8 @@ class _NewJob(_Handler):
             name = self.app.jobs.add(lambda results: self.app.words(command, values, results))
         except FogmlError as error:
             raise HTTPError(400, str(error)) from None
+        except OSError as error:
+            raise HTTPError(507, f"the job cannot be kept: {error.strerror}") from None
         self.answer({"name": name})
 
 

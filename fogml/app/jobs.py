@@ -141,13 +141,14 @@ class Jobs:
         states = {name: self.state(name) for name in self.names()}
         free = self.at_once - sum(state == "running" for state in states.values())
         for name in [name for name, state in states.items() if state == "waiting"][: max(free, 0)]:
-            # It returns once the job is under way, in a session of its own.
+            # It returns once the job is under way, in a session of its own. One that can't be begun, as on a
+            # disk that is full, waits on.
             subprocess.run(
                 [sys.executable, "-P", "-m", "fogml.app.jobs", str(self.folder / name)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                check=True,
+                check=False,
                 env=of_this_package(),
             )
 

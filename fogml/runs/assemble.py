@@ -137,7 +137,7 @@ def runs_of_columns(
         called, own = name, facts
         if len(ordered.legs) > 1:
             called = f"{name} leg {number + 1}"
-            own = facts if number == 0 else facts.model_copy(update={"powered_on": None})
+            own = facts if number == 0 else facts.model_copy(update={"powered_on": None, "started": None})
         if len(part_rows) < 2:
             raise too_short(table.file, len(part_rows))
         said += [finding] if finding else []

@@ -189,7 +189,10 @@ def check_joined(log: JoinedLog) -> None:
         )
     if "time" not in log.columns or "gyro" in log.columns or len(log.columns) < 2:
         raise ValueError("key 'join.columns': 'time' and columns beside 'gyro' were expected")
-    _check_units(log.columns)
+    _check_units(log.columns, "join.columns")
+    for name, column in log.columns.items():
+        if column.source is None:
+            raise ValueError(f"key 'join.columns.{name}.source': missing")
     for rule in log.where:
         _check_filter("join.where", rule)
 
@@ -214,19 +217,21 @@ def _check_columns(profile: ImportProfile) -> None:
             raise ValueError("key 'columns.gyro.source': give it here or under 'axes', not both")
 
 
-def _check_units(columns: dict[str, ImportColumn]) -> None:
+def _check_units(columns: dict[str, ImportColumn], key: str = "columns") -> None:
     for name, column in columns.items():
         spec = column_spec(name)
         if spec is None:
             known = known_are(name, [*KNOWN, "T1, T2 ..."], "those")
-            raise ValueError(f"key 'columns.{name}': not a column of the run format; {known}")
+            raise ValueError(f"key '{key}.{name}': not a column of the run format; {known}")
+        if column.scale == 0.0:
+            raise ValueError(f"key '{key}.{name}.scale': 0 makes one value of all")
         is_stamp = name == "time" and column.unit == STAMP
         if isinstance(column.source, list) and not is_stamp:
-            raise ValueError(f"key 'columns.{name}.source': one column was expected")
+            raise ValueError(f"key '{key}.{name}.source': one column was expected")
         if not is_stamp and not is_accepted(name, column.unit):
             units = [*spec.units, *([STAMP] if name == "time" else [])]
             told = known_are(str(column.unit), units, "accepted units")
-            raise ValueError(f"key 'columns.{name}.unit': {quoted(column.unit)} is not accepted; {told}")
+            raise ValueError(f"key '{key}.{name}.unit': {quoted(column.unit)} is not accepted; {told}")
 
 
 def profile_names() -> tuple[str, ...]:

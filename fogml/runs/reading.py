@@ -86,7 +86,7 @@ def read_runs(
 ) -> list[Run]:
     """Read the runs in a file, as `read_run`: one, or with `repair` one for each restart of its clock.
 
-    Legs are named ``FILE leg 1`` and so on; a stated time of power-on belongs to the first.
+    Legs are named ``FILE leg 1`` and so on; stated times of power-on and of the beginning are the first's.
     """
     path = Path(path)
     with unchanged(*run_sources(path)):

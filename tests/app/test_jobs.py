@@ -72,6 +72,15 @@ def test_a_job_that_can_not_be_begun_leaves_no_process(tmp_path: Path) -> None:
     assert subprocess.run(command, stderr=subprocess.PIPE, timeout=30).returncode != 0
 
 
+def test_a_job_that_can_not_be_begun_now_waits_on(tmp_path: Path, monkeypatch) -> None:
+    jobs = Jobs(tmp_path, 1)
+    with monkeypatch.context() as patched:
+        patched.setattr("fogml.app.jobs.sys.executable", "/bin/false")
+        name = jobs.add(lambda results: ["docs", "--help"])
+        assert jobs.state(name) == "waiting"
+    until("done", jobs, name)
+
+
 def test_jobs_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path, 0)
     for name in ("9999", "²"):

@@ -192,6 +192,13 @@ def test_fields_of_a_container_by_group(read, tmp_path):
         ('keep: ["T_case [K]"]\n', "key 'keep': 'T_case' is of the run format; state it under 'columns'"),
         ('keep: ["P [bar]", "P [mbar]"]\n', "column 'P' is stated twice"),
         (JOIN.replace("T_chamber", "T"), "column 'T' is stated twice"),
+        (JOIN.replace("source: Oven, ", ""), r"key 'join\.columns\.T_chamber\.source': missing"),
+        (JOIN.replace("source: When, unit: stamp", "unit: s"), r"key 'join\.columns\.time\.source': missing"),
+        (JOIN.replace("unit: K", "unit: s"), r"key 'join\.columns\.T_chamber\.unit': 's' is not accepted"),
+        (
+            JOIN.replace("unit: K", "unit: K, scale: 0"),
+            r"'join\.columns\.T_chamber\.scale': 0 makes one value",
+        ),
         (
             "where: [{source: State, equal: up}]\n",
             "unknown key 'where.0.equal'; did you mean 'equals'. known keys are source",

@@ -116,7 +116,7 @@ def test_a_recording_of_an_hour_that_begins_anew_is_two(tmp_path):
 def test_a_restarted_clock_makes_legs(tmp_path, second):
     time = np.concatenate([0.1 * np.arange(500) + 400.0, 0.1 * np.arange(700) + 400.0 + second])
     path = file_of(tmp_path, ".csv", time, np.arange(1200.0))
-    path.with_suffix(".yaml").write_text("powered_on: 390.0\n")
+    path.with_suffix(".yaml").write_text("powered_on: 390.0\nstarted: 2026-03-02T08:00:00Z\n")
     with pytest.raises(InputError, match=r"restarts once.*1 to 500, 501 to 1200.*each leg a run of its own"):
         read_run(path)
     with pytest.raises(InputError, match=r"restarts once.*one run is needed"):
@@ -126,6 +126,7 @@ def test_a_restarted_clock_makes_legs(tmp_path, second):
     assert (first.gyro.tolist(), other.gyro.tolist()) == (list(range(500)), list(range(500, 1200)))
     np.testing.assert_array_equal(other.time, time[500:])
     assert (first.facts.powered_on, other.facts.powered_on) == (390.0, None)
+    assert first.facts.started is not None and other.facts.started is None
     assert counts(first) == {"repaired_restart": 1}
 
 
