@@ -86,6 +86,8 @@ class Hdf5:
 
     def fault_of(self, dataset: Any) -> str | None:
         """Why a dataset is not read: its samples lie elsewhere, or other code would unpack them."""
+        if dataset.shape is None:
+            return "holds nothing"
         if dataset.is_virtual or dataset.external:
             return "refers to samples in another file"
         if dataset.dtype.kind not in "fiub":
@@ -171,6 +173,8 @@ class Mat:
         return found
 
     def text(self, item: Any) -> str:
+        if item.shape is None:
+            return ""
         if item.size > _MOST_TEXT or self.opened is None or self.opened.fault_of(item):
             raise Refused("a text that is too long, or stands elsewhere")
         return "".join(chr(int(code)) for code in np.asarray(item).T.reshape(-1))

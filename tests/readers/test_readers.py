@@ -20,6 +20,8 @@ from fogml.runs.opening import file_format
 from fogml.runs.profiles import import_recording
 from fogml.runs.reading import read_blocks, read_run, read_table
 from fogml.runs.reading_limits import DEFAULT_LIMITS
+from fogml.runs.run import Run
+from fogml.runs.writing import write_run
 from tests.readers import files
 from tests.readers.files import AXES, COUNT, GYRO, TIME, WARM
 
@@ -400,6 +402,28 @@ def test_a_recording_in_parquet_began_when_its_clock_did(tmp_path):
     frame.insert(0, "exported", pandas.Timestamp("2026-06-30T12:00:00"))
     frame.to_parquet(path, index=False)
     assert read_run(path).facts.started == STARTED
+
+
+def test_a_dataset_without_a_value_is_left_out_and_a_column_without_one_named(tmp_path):
+    """A null dataspace, of which the library gives no shape."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["time [s]"], file["gyro [deg/h]"], file["empty"] = TIME, GYRO, h5py.Empty("f8")
+    run = read_run(path)
+    assert "'empty' is left out: it holds nothing" in [f.message for f in run.findings]
+    with h5py.File(path, "a") as file:
+        del file["gyro [deg"]
+        file["gyro [deg/h]"] = h5py.Empty("f8")
+    with pytest.raises(InputError, match=r"run\.h5, column 'gyro': holds nothing; one number per sample"):
+        read_run(path)
+    path = tmp_path / "run.mat"
+    write_run(Run.from_columns(time=TIME, gyro=GYRO), path, mat_version="7.3")
+    with h5py.File(path, "a") as file:
+        for name, kind in (("note", "char"), ("empty", "double")):
+            file[name] = h5py.Empty("u2" if kind == "char" else "f8")
+            file[name].attrs["MATLAB_class"] = np.bytes_(kind)
+    np.testing.assert_array_equal(read_run(path).gyro, GYRO)
 
 
 def test_the_reader_of_the_recipe_gives_its_columns(tmp_path):
