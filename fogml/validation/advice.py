@@ -225,9 +225,16 @@ def _limits(judgement: Judgement) -> Iterator[Reason]:
 
 
 def _one_temperature(judgement: Judgement) -> Iterator[Reason]:
-    held = _temperatures(judgement.train)
+    held, used = _temperatures(judgement.train), _temperatures(judgement.test)
+    if held and used and _span(used) < LEAST_SPAN_DEGC <= _span(held):
+        yield Reason(
+            "use_with_care",
+            "judged at one temperature",
+            f"The test runs stay within {short(_span(used), 2)} degC, where training went over "
+            f"{short(_span(held), 2)}: what it makes of temperatures that change was not tested.",
+            "Judge it on a run that goes over the range of use.",
+        )
     if held and _span(held) < LEAST_SPAN_DEGC:
-        used = _temperatures(judgement.test)
         yield Reason(
             "do_not_use" if used and _span(used) >= LEAST_SPAN_DEGC else "use_with_care",
             "trained at one temperature",

@@ -54,6 +54,11 @@ def narrow() -> Judgement:
     return replace(base, train=(replace(run, series=flat),))
 
 
+def judged_at_one_temperature() -> Judgement:
+    base = judgement()
+    return replace(base, test=(replace(base.test[0], series=narrow().train[0].series),))
+
+
 def used_there(judged: Judgement) -> Judgement:
     """A judgement whose test run stays at the temperature trained at."""
     (run,), (trained,) = judged.test, judged.train
@@ -106,6 +111,7 @@ def test_nothing_against_is_use() -> None:
         (lambda: judgement(limit=1e-3), "do_not_use", "rms over its limit"),
         (overconfident, "use_with_care", "its interval does not hold on b.csv"),
         (narrow, "do_not_use", "trained at one temperature"),
+        (judged_at_one_temperature, "use_with_care", "judged at one temperature"),
         (lambda: used_there(narrow()), "use_with_care", "trained at one temperature"),
         (
             lambda: replace(narrow(), test=judgement(left=3.0).test),
