@@ -93,12 +93,14 @@ def _compare(
 
 
 def _print(comparison: Comparison, terminal: Terminal) -> None:
-    from fogml.report.compare_page import models_table, ranked
+    from fogml.report.compare_page import doubts_of, models_table, ranked
     from fogml.report.verdict import own_noise_by, worst_run
 
     order = ranked(comparison.judgements)
     best = order[0]
     terminal.show(models_table(comparison.judgements, order))
+    for text in doubts_of(comparison.judgements[best]):
+        terminal.say(text)
     terminal.say(f"{best} leaves least. {own_noise_by(worst_run(comparison.judgements[best].test))}")
     for name, reason in comparison.failed.items():
         terminal.say(f"{name}: not fitted: {reason}")

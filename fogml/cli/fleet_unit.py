@@ -173,20 +173,16 @@ def check_belong(unit: Unit, runs: Sequence[Run]) -> None:
 
 
 def _told(judgement: Judgement) -> dict[str, Any]:
-    from fogml.validation.advice import advice_on
+    from fogml.validation.advice import advice_on, output_reasons
 
     worst = max(judgement.test, key=lambda run: run.after.rms)
-    still = [
-        f"the output of {run.run} stands still: {run.still[0]}"
-        for run in (*judgement.train, *judgement.test)
-        if run.still
-    ]
+    doubts = [f"{one.brief}: {one.sentence.partition(': ')[2]}" for one in output_reasons(judgement)]
     return {
         "model": str(judgement.model["kind"]),
         "met": judgement.met,
         "verdict": advice_on(judgement).grade,
         "worst": _worst(worst, worst.before.rms, worst.after.rms, worst.outside_training),
-        "notes": [str(note) for note in (*still, *judgement.notes, *judgement.model.get("notes", ()))],
+        "notes": [str(note) for note in (*doubts, *judgement.notes, *judgement.model.get("notes", ()))],
     }
 
 

@@ -20,6 +20,7 @@ from fogml.numerals import in_order_of_serial, percent, short
 FLEET_SCHEMA = "fogml.fleet/1"
 _OUTLYING = 3.5
 # Robust standard deviations (B. Iglewicz & D. Hoaglin, How to Detect and Handle Outliers, 1993).
+_OF_OUTPUTS = (" stands still: ", " saturates: ", " can't be as stated: ")
 _OUTSIDE = 0.1
 _FLOORS = 3.0
 _LEAST_OUTLIER_UNITS = 5
@@ -162,8 +163,8 @@ def _why_again(unit: Mapping[str, Any]) -> str:
         return "not every limit is tested" if not_tested else "a stated limit is not met"
     if unit["after"] is None:
         return ""
-    if still := [note for note in unit["notes"] if "stands still" in note]:
-        return still[0]
+    if doubts := [note for note in unit["notes"] if any(word in note for word in _OF_OUTPUTS)]:
+        return doubts[0]
     if unit["after"] > unit["before"]:
         return "the model does harm on the test run: training and test runs do not tell the same"
     if (unit["outside_training"] or 0.0) > _OUTSIDE:

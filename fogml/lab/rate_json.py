@@ -31,6 +31,7 @@ from fogml.numerals import short
 from fogml.runs.findings import of_any_use
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
+from fogml.runs.settling import LEAST_ROWS
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.twin.coil import LayeredCoil, lead_sensitivity, midpoint_sensitivity, radial_sensitivity
 from fogml.twin.twin import Twin
@@ -283,7 +284,7 @@ def unit_facts(twin: Twin) -> dict[str, Any]:
 def _notes(values: dict[str, Any]) -> list[str]:
     """What each test that is missing needs."""
     needs = {
-        "scale_factor": "scale factor: several rates of both senses",
+        "scale_factor": f"scale factor: three stays or more at rates of both senses, of over {2 * LEAST_ROWS} samples each",
         "threshold": "threshold and dead zone: rates of both senses about zero, Earth rate turned away",
         "resolution": "resolution: small steps of the rate on top of a larger one",
         "bandwidth": "bandwidth: the table turning to and fro at two frequencies or more",

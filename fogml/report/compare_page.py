@@ -16,6 +16,7 @@ from fogml.report.style import log_axis, segments_of, shade, time_unit
 from fogml.report.tables import Row, Table, columns_of
 from fogml.report.verdict import floor_told, own_noise, stated_limits, unseen, worst_run
 from fogml.signals.drawn import drawn, gap_starts
+from fogml.validation.advice import output_reasons
 from fogml.validation.results import Judgement, RunJudgement
 
 CHOOSER = "auto"
@@ -71,6 +72,7 @@ def ranked(judgements: Mapping[str, Judgement]) -> list[str]:
 def _verdict(judgements: Mapping[str, Judgement], order: list[str]) -> list[str]:
     best = worst_run(judgements[order[0]].test)
     sentences = [
+        *doubts_of(judgements[order[0]]),
         f"{order[0]} leaves least: rms {number(best.after.rms)} deg/h of {number(best.before.rms)} deg/h on "
         f"{best.run} ({averages(best.averaging_s)}); {floor_told(best)}.",
         own_noise(best),
@@ -86,6 +88,11 @@ def _verdict(judgements: Mapping[str, Judgement], order: list[str]) -> list[str]
         if harm:
             sentences.append(f"Worse than no drift model (mean): {listed(harm, 6)}.")
     return sentences
+
+
+def doubts_of(judgement: Judgement) -> list[str]:
+    """What makes the figures of every model doubtful, in sentences."""
+    return list(dict.fromkeys(one.sentence for one in output_reasons(judgement)))
 
 
 def _chosen(judgements: Mapping[str, Judgement]) -> str:
@@ -112,7 +119,7 @@ def models_table(judgements: Mapping[str, Judgement], order: list[str]) -> Table
         cells = [
             name,
             number(worst.after.rms),
-            number(worst.after.rms / worst.floor if worst.floor > 0 else math.inf),
+            number(worst.after.rms / worst.floor if worst.floor > 0 else None),
             number(worst.after.bias),
             number(worst.after.bias_stability),
             number(worst.after.range),

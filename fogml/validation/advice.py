@@ -135,7 +135,9 @@ def coverage(run: RunJudgement) -> float | None:
     return float(np.mean((series.after >= series.lower) & (series.after <= series.upper)))
 
 
-def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
+def output_reasons(judgement: Judgement, asked: Asked | None = None) -> Iterator[Reason]:
+    """What speaks against any model of these runs: an output that is still or saturates, what can't be."""
+    asked = asked or Asked()
     for runs, what in ((judgement.train, "learnt"), (judgement.test, "judged")):
         for run in runs:
             if (still := still_reason(run, asked.mostly_still, what)) is not None:
@@ -143,6 +145,10 @@ def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
             if (cut := saturated_reason(run, asked.saturated, asked.mostly_still, what)) is not None:
                 yield cut
             yield from implausible_reasons(run)
+
+
+def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
+    yield from output_reasons(judgement, asked)
     yield from unit_reasons(judgement.train, judgement.test)
     yield from _not_judged(judgement)
     yield from _one_way(judgement)

@@ -223,7 +223,7 @@ def judge_run(
         before=metrics.figures(before),
         after=metrics.figures(after),
         floor=floor.value,
-        floor_ci90=(floor.lower, floor.upper),
+        floor_ci90=(floor.lower, floor.upper) if floor.upper > 0.0 else None,
         floor_source=floor.source,
         outside_training=share,
         rows_used=int(used.sum()),

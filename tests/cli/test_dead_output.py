@@ -55,6 +55,15 @@ def test_a_dead_output_is_refused_where_it_would_be_evidence(run_files, dead, tm
         assert told.splitlines()[-1].startswith("fogml: dead.csv: 'gyro' is 0 in every sample")
 
 
+def test_no_model_is_compared_on_a_dead_output_in_silence(run_files, dead, tmp_path, invoke):
+    out = tmp_path / "out"
+    words = ("compare", run_files[0], "--test", dead, "--models", "mean,M2", "-o", out)
+    for told in (invoke(*words).stdout, (out / "compare.html").read_text()):
+        assert "not connected or not switched on" in told and "nothing is judged there" in told
+        assert "∞" not in told
+    assert '"floor_ci90": null' in (out / "compare.json").read_text()
+
+
 def test_a_fleet_says_which_unit_was_not_connected(run_files, dead, tmp_path, invoke_json):
     manifest = tmp_path / "units.csv"
     manifest.write_text(f"unit,job,train,test\nFOG-1,train,{run_files[0]},{dead}\n")
@@ -68,3 +77,15 @@ def test_compensating_a_dead_output_says_so(dead, tmp_path, invoke, trained):
     assert told.stderr.count("dead.csv: 'gyro' is 0 in every sample") == 1
     rows = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
     assert len(rows) == 1500
+
+
+def test_a_fleet_says_which_unit_s_temperature_can_not_be(run_files, tmp_path, invoke_json):
+    head, *rows = csv_text(4).splitlines()
+    cells = [row.split(",") for row in rows]
+    path = tmp_path / "kelvin.csv"
+    warm = [",".join([*row[:2], f"{float(row[2]) + 273.15:.3f}"]) for row in cells]
+    path.write_text("\n".join([head, *warm]) + "\n")
+    manifest = tmp_path / "manifest.csv"
+    manifest.write_text(f"unit,job,train,test\nFOG-1,train,{run_files[0]},{path}\n")
+    told = invoke_json("fleet", manifest, "--model", "M2", "-o", tmp_path / "out")
+    assert "kelvin?" in told["again"][0]["why"]
