@@ -17,6 +17,7 @@ from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport,
 from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries, beyond_noise
 from fogml.gap.where import averages
 from fogml.numerals import percent, probability_words, short
+from fogml.runs.findings import IMPLAUSIBLE, SPOILING
 from fogml.signals.bases import rate
 from fogml.signals.noise_expectation import floor_square
 from fogml.signals.whiteness import whiteness
@@ -140,6 +141,12 @@ def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tupl
 def assumed(found: Inference, constants: Sequence[ConstantFit]) -> tuple[str, ...]:
     """What was taken for granted, in sentences, the priors among them; `constants` as they were found."""
     setting, said = found.setting, []
+    for rows in found.setting.scene.runs:
+        for one in rows.run.findings:
+            if one.code in IMPLAUSIBLE or (one.code in SPOILING and one.column == "gyro"):
+                said.append(
+                    f"{rows.run.name}: {one.message}; taken as it is, and if it is wrong, so is all here."
+                )
     for fit in constants:
         off = abs(fit.value - fit.prior_mean) / fit.prior_sd
         if fit.name in setting.widened and off > setting.priors.noise.far_off:

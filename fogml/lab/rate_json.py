@@ -284,7 +284,7 @@ def unit_facts(twin: Twin) -> dict[str, Any]:
 def _notes(values: dict[str, Any]) -> list[str]:
     """What each test that is missing needs."""
     needs = {
-        "scale_factor": f"scale factor: three stays or more at rates of both senses, of over {2 * LEAST_ROWS} samples each",
+        "scale_factor": f"scale factor: three stays of over {2 * LEAST_ROWS} samples at rates of both senses",
         "threshold": "threshold and dead zone: rates of both senses about zero, Earth rate turned away",
         "resolution": "resolution: small steps of the rate on top of a larger one",
         "bandwidth": "bandwidth: the table turning to and fro at two frequencies or more",
