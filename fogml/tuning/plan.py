@@ -133,7 +133,7 @@ class Space(Strict):
         parameters = {
             name: _value(trial, f"{model}.{name}", values) for name, values in self.models[model].items()
         }
-        return Choice(model, text, parameters) if text else Choice("mean", "", {})
+        return Choice(model, text, parameters) if text and model != "mean" else Choice("mean", "", {})
 
     def extreme_texts(self) -> Iterator[str]:
         """Every feature text of the space, windows at their longest."""
@@ -147,12 +147,12 @@ class Space(Strict):
     def check(self) -> None:
         """Check models, their parameters and features before any run is read."""
         from fogml.features.parse import parse_features
-        from fogml.models.names import make_model
+        from fogml.models.names import PRESETS, make_model
 
         for text in self.extreme_texts():
             parse_features(text)
         for name, parameters in self.models.items():
-            if name in ("auto", "none", "joint", "joint-patent") or name.startswith(("M", "multipoint")):
+            if name in ("auto", "none", "joint", "joint-patent", *PRESETS):
                 raise InputError(
                     f"space: model '{name}' leaves nothing to choose; sweep polynomial, rbf, rbf-patent "
                     "or a scikit-learn regressor by its dotted name"

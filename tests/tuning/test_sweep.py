@@ -107,6 +107,19 @@ def _told(study, objectives=("rms", "bytes")):
     return json.dumps(values)
 
 
+def test_a_mean_among_the_models_takes_no_features(tmp_path):
+    space = {"features": ["T"], "models": ["mean"]}
+    (trial,) = run_sweep(plan(tmp_path, space=space, trials=1)).get_trials()
+    assert trial.state.name == "COMPLETE" and trial.user_attrs["features"] == ""
+
+
+def test_presets_alone_leave_nothing_to_choose(tmp_path):
+    with pytest.raises(InputError, match="'M3' leaves nothing to choose"):
+        run_sweep(plan(tmp_path, space={"features": ["T"], "models": ["M3"]}))
+    with pytest.raises(InputError, match=r"model 'Mine'.*known"):
+        run_sweep(plan(tmp_path, space={"features": ["T"], "models": ["Mine"]}))
+
+
 @pytest.mark.parametrize(("folds", "told"), [("time", "blocks of time"), ("auto", "runs")])
 def test_what_was_held_out_is_told_as_it_was_whatever_the_number_of_runs(tmp_path, folds, told):
     space = {"features": ["T"], "models": ["polynomial"]}
