@@ -18,7 +18,7 @@ from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.other_rate import Beside, clock_s, interpolated
-from fogml.runs.raw_table import RawTable, choose_vectors, moment, stored_blocks
+from fogml.runs.raw_table import RawTable, choose_vectors, moment, stored_blocks, vector_fault
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.signals import large
@@ -213,6 +213,9 @@ def container_columns(
     with stored_file(path, kind, names, DEFAULT_LIMITS) as stored:
         groups = {group.name: group for group in groups_of(stored, kind)}
         found = {source: _source(path, stored, source) for source in sources}
+        for source, array in found.items():
+            if fault := vector_fault(array):
+                raise InputError(f"{path.name}, column {quoted(str(source))}: {fault}; name another")
         names = [array.group for array in found.values()]
         main = found[clock].group if clock is not None else max(names, key=names.count)
         count = max(next(array for array in found.values() if array.group == main).shape)

@@ -201,7 +201,7 @@ def _columns(fields: Sequence[_Field]) -> list[str]:
     lines.append("  gyro: " + _gyro(gyros[0] if gyros else None, many))
     used: set[str] = set()
     warm_before = len(lines)
-    of_a_run = _taken(left, _is_of_a_run)
+    of_a_run = _taken(left, lambda f: _is_of_a_run(f) and not (clock and f.name == "time"))
     faces = [face_of(one.name) for one in of_a_run]
     for one, face in zip(of_a_run, faces if "T_in" in faces else [None] * len(faces), strict=True):
         lines.append(_other(one, face, used))
@@ -209,7 +209,7 @@ def _columns(fields: Sequence[_Field]) -> list[str]:
         lines.append(f"  # T: {{source: {_quoted(rest[0].source)}, unit: degC}}    # a drift model needs one")
     if many:
         lines.append("axes: {" + ", ".join(f"{axis}: {_quoted(f.source)}" for axis, f in axes.items()) + "}")
-    if not clock:
+    if not any(line.startswith("  time:") for line in lines):
         lines.append(f"sample_s: 0.01    {_MARK}no clock was found; write the true interval [s]")
     others = [*left, *([] if many else gyros[1:])]
     rest = [f for f in others if isinstance(f.source, str) and (np.isfinite(f.numbers).any() or not f.first)]
@@ -245,8 +245,10 @@ def _clock(left: list[_Field]) -> list[str]:
         sources = [_quoted(f.source) for f in stamped[:2]]
         shown = f"[{', '.join(sources)}]" if len(sources) > 1 else sources[0]
         return [f"  time: {{source: {shown}, unit: stamp}}"]
-    named = [f for f in left if f.name == "time" or _TIME.search(f.name) or _DATE.search(f.name)]
-    known = named or [f for f in left if _grows(f)][:1]
+    # Other columns of the run format, such as a T that grows, are no clocks.
+    free = [f for f in left if f.name == "time" or column_spec(f.name) is None]
+    named = [f for f in free if f.name == "time" or _TIME.search(f.name) or _DATE.search(f.name)]
+    known = sorted(named, key=lambda f: f.name != "time") or [f for f in free if _grows(f)][:1]
     growing = [f for f in known if _grows(f) or not f.first]
     if not growing:
         return []

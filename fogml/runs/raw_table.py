@@ -85,6 +85,14 @@ def wanted_cells(cells: Iterable[str], names: Collection[str] | None) -> list[st
     return [cell for cell, name in held.items() if name in wanted]
 
 
+def vector_fault(array: StoredArray) -> str | None:
+    """Why an array is no column of numbers; None where it is one."""
+    if array.fault is None and (array.kind not in "fiub" or not array.is_vector):
+        shape = " by ".join(str(size) for size in array.shape) or "one value"
+        return f"holds {array.type_name} ({shape}), a vector of numbers was expected"
+    return array.fault
+
+
 def choose_vectors(
     file: str, arrays: Sequence[tuple[str, StoredArray]]
 ) -> tuple[list[tuple[str, StoredArray]], tuple[Finding, ...]]:
@@ -113,11 +121,8 @@ def choose_vectors(
     count = None if time is None or time.fault else max(time.shape, default=0)
     for cell, array in arrays:
         name = parse_header(cell)[0]
-        fault = array.fault
-        if fault is None and (array.kind not in "fiub" or not array.is_vector):
-            shape = " by ".join(str(size) for size in array.shape) or "one value"
-            fault = f"holds {array.type_name} ({shape}), a vector of numbers was expected"
-        elif fault is None and count is not None and max(array.shape) != count:
+        fault = vector_fault(array)
+        if fault is None and count is not None and max(array.shape) != count:
             fault = f"holds {max(array.shape)} samples, 'time' holds {count}"
         if fault is None:
             kept.append((cell, array))

@@ -117,6 +117,36 @@ def test_a_name_of_any_characters_is_the_source_and_no_other_key(tmp_path, name)
     assert profile.sample_s == 0.01 and not profile.legs
 
 
+def test_a_temperature_that_grows_is_no_clock_and_a_clock_that_does_not_is_there_once(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path, profile = tmp_path / "log.h5", tmp_path / "p.yaml"
+    columns = {"T [degC]": 20.0 + np.arange(50.0), "gyro [deg/h]": np.sin(np.arange(50.0))}
+    with h5py.File(path, "w") as file:
+        for name, values in (columns | {"time [s]": 0.5 * np.arange(50.0)}).items():
+            file[name] = values
+    profile.write_text(draft_profile(path))
+    (run,) = import_recording(path, profile)
+    np.testing.assert_array_equal(run.time, 0.5 * np.arange(50.0))
+    np.testing.assert_array_equal(run.columns["T"], columns["T [degC]"])
+    with h5py.File(path, "a") as file:
+        file["time [s]"][3] = 0.0
+    profile.write_text(draft_profile(path))
+    with pytest.raises(InputError, match="column 'time', data row 4: time goes back"):
+        import_recording(path, profile)
+
+
+def test_a_source_that_is_no_vector_is_named(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path, profile = tmp_path / "log.h5", tmp_path / "p.yaml"
+    with h5py.File(path, "w") as file:
+        file["time [s]"], file["gyro [deg/h]"] = np.arange(9.0), 2.0
+    profile.write_text(draft_profile(path))
+    with pytest.raises(
+        InputError, match=r"log\.h5, column 'gyro \[deg/h\]': holds float64 \(one value\), a vector"
+    ):
+        import_recording(path, profile)
+
+
 def test_the_command_writes_it_and_shows_the_first_rows(tmp_path):
     files.npz(tmp_path / "log.npz")
     profile = tmp_path / "profile.yaml"
