@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
@@ -45,6 +45,8 @@ class Plateaus:
         Standard error of that mean from the white noise of its samples [deg/h], shape (k,).
     rate_error
         The same of the recorded rate [deg/h], 0 for one that was commanded, shape (k,).
+    clipped
+        1 where the output is cut off at the run's greatest or least value, else 0, shape (k,).
     """
 
     start: FloatArray
@@ -54,14 +56,14 @@ class Plateaus:
     output: FloatArray
     error: FloatArray
     rate_error: FloatArray
+    clipped: FloatArray
 
     def __len__(self) -> int:
         return len(self.time)
 
     def __getitem__(self, which: BoolArray) -> Plateaus:
         """Some of them."""
-        kept = (self.start, self.stop, self.time, self.rate, self.output, self.error, self.rate_error)
-        return Plateaus(*(values[which] for values in kept))
+        return Plateaus(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +117,24 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
     told = [_told(run, output, *pair) for pair in rows]
     columns = np.array([(*pair, *values) for pair, values in zip(rows, told, strict=True)]).reshape(-1, 7)
     start, stop = columns[:, :2].astype(np.intp).T
-    return Plateaus(start, stop, *columns[:, 2:].T)
+    return Plateaus(start, stop, *columns[:, 2:].T, _clipped(output, rows))
+
+
+def _clipped(
+    output: FloatArray, rows: Sequence[tuple[int, int]], least: float = 0.05, times: float = 3.0
+) -> FloatArray:
+    """Where more than a share `least` of a plateau's samples is at an end of the output, shape (k,).
+
+    And so many `times` more than plateaus mostly have at their own greatest value: coarse counts and an
+    output without noise rest there anyway.
+    """
+    if not rows:
+        return np.zeros(0)
+    low, high = float(output.min()), float(output.max())
+    parts = [output[start:stop] for start, stop in rows]
+    usual = float(np.median([np.mean(part == part.max()) for part in parts]))
+    at_end = np.array([max(np.mean(part == low), np.mean(part == high)) for part in parts])
+    return np.asarray(at_end > least + times * usual, dtype=np.float64)
 
 
 def _long_gaps(run: Run, start: int, stop: int) -> list[int]:

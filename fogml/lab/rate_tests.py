@@ -118,7 +118,7 @@ def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | N
     """Scale factor and range of a ladder of rates; None where fewer than two rates differ.
 
     Rates are taken in by their size as long as the output of the next one falls short of the line through
-    those below it by `range_error` at most. Beyond a dead zone it catches up instead.
+    those below it by `range_error` at most, and is not cut off. Beyond a dead zone it catches up instead.
     """
     if len(plateaus) < 3 or len(np.unique(merged(plateaus.rate, plateaus.rate_error))) < 2:
         return None
@@ -133,7 +133,7 @@ def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | N
         expected = scale * plateaus.rate + bias + drift * plateaus.time
         top = (size >= 0.5 * (sizes[place - 1] + sizes[place])) & within
         lacking = (np.sign(scale * plateaus.rate) * (expected - plateaus.output))[top].max(initial=0.0)
-        if lacking <= criteria.range_error * sizes[place]:
+        if lacking <= criteria.range_error * sizes[place] and not plateaus.clipped[top].any():
             break
         within = below
     kept, beyond = plateaus[within], plateaus[~within]

@@ -262,3 +262,17 @@ def test_a_threshold_that_noise_leaves_open_has_no_end() -> None:
     found = least_seen([Answer(0.5, 0.5, 0.1), Answer(1.0, 0.6, 0.15)], Criteria())
     assert found is not None
     assert bracketed({"above_deg_h": found.above, "below_deg_h": found.below}) == "within noise"
+
+
+def test_a_rate_at_which_the_output_is_cut_off_is_beyond_the_range() -> None:
+    """A digital output ends at its rated range: cut off by less than its error, 40 deg/s read none."""
+    ladder = np.array([0.0, 5.0, -5.0, 10.0, -10.0, 20.0, -20.0, 40.0, -40.0, 0.0])
+    run = by_hand(ladder)
+    cut = run.with_columns(gyro=np.clip(run.gyro, -3600.0 * 40.0, 3600.0 * 40.0))
+    told = rate_json([cut], source="cut")
+    assert (told["range"]["followed_deg_s"], told["range"]["exceeded_deg_s"]) == pytest.approx((20.0, 40.0))
+    low, high = told["scale_factor"]["ci90"]
+    assert low < 1.0002 < high
+    # Neither coarse counts nor an output without noise are cut off.
+    for gyro in (500.0 * np.round(run.gyro / 500.0), 1.0002 * 3600.0 * run.columns["rate"]):
+        assert rate_json([run.with_columns(gyro=gyro)], source="whole")["range"]["exceeded_deg_s"] is None
