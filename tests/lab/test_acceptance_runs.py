@@ -178,6 +178,10 @@ def test_what_can_not_be_as_stated_is_in_the_notes(cycle):
     turned = cycle.with_columns(rate=-cycle.rate)
     told = acceptance_json([turned.with_findings(check_run(turned))])
     assert "with the other sign" in told["notes"][0]
+    noisy = cycle.gyro + np.random.default_rng(3).normal(0.0, 0.05, len(cycle))
+    beyond = cycle.with_columns(gyro=np.clip(noisy, -3600.0 * 50.0, 3600.0 * 50.0))
+    told = acceptance_json([beyond.with_findings(check_run(beyond))])
+    assert "may saturate" in told["notes"][0] and "may saturate" not in " ".join(told["reasons"])
 
 
 def test_a_threshold_above_all_that_was_tested_is_told_and_misses_its_limit():
