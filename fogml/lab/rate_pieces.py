@@ -117,7 +117,8 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
     told = [_told(run, output, *pair) for pair in rows]
     columns = np.array([(*pair, *values) for pair, values in zip(rows, told, strict=True)]).reshape(-1, 7)
     start, stop = columns[:, :2].astype(np.intp).T
-    return Plateaus(start, stop, *columns[:, 2:].T, _clipped(output, rows))
+    values = [*columns[:, 2:].T, _clipped(output, rows)]
+    return Plateaus(start, stop, *values)
 
 
 def _clipped(
