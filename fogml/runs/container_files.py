@@ -17,7 +17,7 @@ from fogml.readers import reader_of
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
-from fogml.runs.other_rate import Beside, clock_s, interpolated
+from fogml.runs.other_rate import Beside, clock_s, interpolated, is_held
 from fogml.runs.raw_table import RawTable, choose_vectors, moment, stored_blocks, vector_fault
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
@@ -172,9 +172,8 @@ def _one_of_each(
 def _joined_findings(joined: Sequence[tuple[str, Group, StoredArray]]) -> Iterator[Finding]:
     for cell, group, array in joined:
         name = parse_header(cell)[0]
-        message = (
-            f"'{name}' of {quoted(group.name)}, {max(array.shape)} values, interpolated at its true times"
-        )
+        how = "held" if is_held(name) else "interpolated"
+        message = f"'{name}' of {quoted(group.name)}, {max(array.shape)} values, {how} at its true times"
         yield Finding("other_rate", message, column=name, count=max(array.shape))
 
 
@@ -198,11 +197,16 @@ def _with_joined(table: RawTable, stored: StoredFile, joined: Sequence[Beside]) 
 
 
 def container_columns(
-    path: Path, kind: str, sources: Sequence[str | int], clock: str | int | None
+    path: Path,
+    kind: str,
+    sources: Sequence[str | int],
+    clock: str | int | None,
+    held: Collection[str | int | None] = (),
 ) -> tuple[dict[str | int, FloatArray], tuple[Finding, ...]]:
     """Columns of a file of groups by ``GROUP/FIELD``, or by the field where there is one of that name.
 
-    All are brought to the times of the group that most of them are of, or that holds `clock`.
+    All are brought to the times of the group that most of them are of, or that holds `clock`; those of `held`
+    keep a value until the next one.
 
     Raises
     ------
@@ -227,7 +231,7 @@ def container_columns(
             if array.group != main:
                 at, own = (_clock_of(path, stored, groups[name]) for name in (main, array.group))
                 findings.append(next(_joined_findings([(array.name, groups[array.group], array)])))
-                values = interpolated(at, own, values)
+                values = interpolated(at, own, values, source in held)
             columns[source] = values
             if len(values) != count:
                 raise InputError(f"{path.name}: {quoted(str(source))} holds {len(values)} values of {count}")

@@ -18,13 +18,15 @@ from fogml.runs.findings import Finding
 from fogml.runs.logger_lines import FaultyFields
 from fogml.runs.logger_text import LoggerTable, read_logger_text
 from fogml.runs.opening import Opened, opened
-from fogml.runs.other_rate import interpolated
+from fogml.runs.other_rate import interpolated, is_held
 from fogml.runs.profile_parts import ImportColumn, JoinedLog, LegByState, LegByTime, RowFilter, TextLayout
 from fogml.runs.profile_schema import ImportProfile
 from fogml.runs.stamps import Stamps
 from fogml.signals import large
 
-__all__ = ["chosen_rows", "internal", "interpolated", "joined_columns", "read_logger", "rows_of_leg"]
+__all__ = [
+    "chosen_rows", "internal", "interpolated", "is_held", "joined_columns", "read_logger", "rows_of_leg",
+]  # fmt: skip
 
 
 def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
@@ -47,7 +49,8 @@ def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
         return replace(table, findings=(*table.findings, *(file.within.findings if file.within else ())))
     if layout.text_sources:
         raise InputError(f"{path.name}: texts and stamps are read from text files; name columns of numbers")
-    columns, findings = container_columns(path, kind, layout.sources, layout.clock)
+    held = {column.number for name, column in layout.columns.items() if is_held(name)}
+    columns, findings = container_columns(path, kind, layout.sources, layout.clock, held)
     count = len(next(iter(columns.values())))
     return LoggerTable(columns, np.arange(count), count, findings)
 

@@ -38,6 +38,12 @@ def is_of_another_rate(values: FloatArray) -> bool:
     return float(np.mean(np.abs(apart - usual) <= max(1.0, 0.5 * usual))) >= REGULAR_SHARE
 
 
+def is_held(name: str) -> bool:
+    """Whether a column, a duty or a switch, keeps its value until the next one."""
+    spec = column_spec(name)
+    return spec is not None and spec.internal == DUTY
+
+
 def on_gyro_rows(
     columns: Mapping[str, FloatArray],
 ) -> tuple[dict[str, FloatArray], IndexArray, tuple[Finding, ...]]:
@@ -69,13 +75,13 @@ def on_gyro_rows(
         findings.append(Finding("other_rate", message, column="gyro", count=len(rows)))
     filled: dict[str, FloatArray] = {}
     for name, values in columns.items():
-        spec = column_spec(name)
-        sparse = spec is not None and name not in ("time", "gyro") and is_of_another_rate(values)
+        is_known = column_spec(name) is not None
+        sparse = is_known and name not in ("time", "gyro") and is_of_another_rate(values)
         if not sparse:
             filled[name] = values[rows]
             continue
         held = np.flatnonzero(~np.isnan(values))
-        hold = spec is not None and spec.internal == DUTY
+        hold = is_held(name)
         filled[name] = _at(time[rows], time[held], values[held], hold)
         how = "held" if hold else "interpolated"
         message = (
@@ -98,13 +104,17 @@ def _at(time: FloatArray, known: FloatArray, values: FloatArray, hold: bool) -> 
     return np.where(hole, np.nan, found)
 
 
-def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:
-    """Values of one rate at the times of another; the first and last are held beyond."""
+def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray, hold: bool = False) -> FloatArray:
+    """Values of one rate at the times of another; the first and last are held beyond, with `hold` each."""
     sound = np.isfinite(at) & np.isfinite(values)
     if not sound.any():
         return np.full(len(seconds), np.nan)
     order = np.argsort(at[sound], kind="stable")
     known_s, known = at[sound][order], values[sound][order]
+    if hold:
+        return large.each(
+            lambda part: known[np.maximum(np.searchsorted(known_s, part, side="right") - 1, 0)], seconds
+        )
     return large.each(lambda part: np.interp(part, known_s, known), seconds)
 
 
@@ -148,7 +158,8 @@ class Beside:
             self._all(stored)
         while self.read < self.count and not (len(self.at_s) and self.at_s[-1] >= sound.max()):
             self._next(stored)
-        found = interpolated(seconds, self.at_s, self.values)
+        hold = is_held(parse_header(self.cell)[0])
+        found = interpolated(seconds, self.at_s, self.values, hold)
         if not self.is_whole:
             kept = max(int(np.searchsorted(self.at_s, sound.max(), side="right")) - 1, 0)
             self.at_s, self.values = self.at_s[kept:], self.values[kept:]

@@ -19,6 +19,7 @@ from fogml.runs.logger_rows import (
     chosen_rows,
     internal,
     interpolated,
+    is_held,
     joined_columns,
     read_logger,
     rows_of_leg,
@@ -271,7 +272,7 @@ def _columns(
             )
         for name in held:
             if name != "time":
-                columns[name] = interpolated(time, at, held[name])
+                columns[name] = interpolated(time, at, held[name], is_held(name))
     for source in profile.keep:
         columns[parse_header(source)[0]] = large.chosen(table.columns[source], part)
     order = ["time", "gyro", *(name for name in columns if name not in ("time", "gyro"))]

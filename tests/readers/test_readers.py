@@ -378,6 +378,24 @@ def test_a_column_that_two_groups_hold_is_of_the_first_and_the_other_is_told(tmp
     assert told == "'T' of 'inner' is read; an import profile reads that of 'rack'"
 
 
+def test_a_switch_of_another_rate_keeps_its_value_until_the_next(tmp_path):
+    """As in a table whose column is empty in most rows; by a profile, too."""
+    nptdms = pytest.importorskip("nptdms")
+    path, profile = tmp_path / "log.tdms", tmp_path / "own.yaml"
+    switched_s, states = np.arange(0.0, 30.0, 4.0), np.arange(8.0) % 2
+    groups = {"g": {"time [s]": TIME, "gyro [deg/h]": GYRO}}
+    groups["rack"] = {"time [s]": switched_s, "heater [0/1]": states}
+    with nptdms.TdmsWriter(str(path)) as writer:
+        for group, columns in groups.items():
+            writer.write_segment([nptdms.ChannelObject(group, *column) for column in columns.items()])
+    profile.write_text(
+        "schema: fogml.import/1\ndescription: bench\ncolumns:\n  time: {source: 'g/time [s]', unit: s}\n"
+        "  gyro: {source: 'gyro [deg/h]', unit: deg/h}\n  heater: {source: 'heater [0/1]', unit: 0/1}\n"
+    )
+    for run in (read_run(path), *read_blocks(path, block_rows=1000), *import_recording(path, profile)):
+        np.testing.assert_array_equal(run.columns["heater"], TIME // 4.0 % 2)
+
+
 def test_messages_of_a_seismometers_logger_beside_its_samples(tmp_path):
     """State of health stands in channels of text whose rate is 0."""
     pymseed = pytest.importorskip("pymseed")
