@@ -66,7 +66,8 @@ def main() -> None:
         suites = [BlindFolder(path.parent) for path in sorted(given.directory.glob("*/*/cases"))]
         marks = [mark for suite in suites for mark in answered_marks(suite, given.method, given.workers)]
     others = {name: _found(given.directory, name)[1] for name in BASELINES}
-    values = told(marks, choices, config["seed"], given.method, given.final, others)
+    even = None if given.answered else evenly(given.directory, given.method, config["parts"])
+    values = told(marks, choices, config["seed"], given.method, given.final, others, even)
     if ledger is not None:
         hashes = "\n".join(one.truth for one in found)
         figures = {row["key"]: row["value"] for row in values["by_reality"][ALL]}
@@ -91,6 +92,15 @@ def _found(directory: Path, method: str) -> tuple[list[Marks], list[Mark]]:
     return found, [mark for one in found for mark in one.methods[method]]
 
 
+def evenly(directory: Path, method: str, parts: Sequence[Mapping[str, Any]]) -> list[Mark]:
+    """The first marks of each part: the same share of each one's planned number."""
+    counts = {part["name"]: part["count"] for part in parts}
+    paths = [path for path in sorted(directory.glob(f"*/*/{method}-{MARKS}")) if path.parent.name in counts]
+    held = [(counts[path.parent.name], read_marks(path).methods[method]) for path in paths]
+    share = min((len(marks) / count for count, marks in held), default=0.0)
+    return [mark for count, marks in held for mark in marks[: round(share * count)]]
+
+
 def answered_marks(folder: BlindFolder, method: str, workers: int = 1) -> list[Mark]:
     """Marks of the cases of a suite that a method has answered by now, failures among them."""
     answers = folder.answers(method)
@@ -106,8 +116,12 @@ def told(
     method: str,
     final: bool,
     others: Mapping[str, Sequence[Mark]] | None = None,
+    even: Sequence[Mark] | None = None,
 ) -> dict[str, Any]:
-    """What ``results.json`` holds of some marks; `others` are those of other methods on the same cases."""
+    """What ``results.json`` holds of some marks; `others` are those of other methods on the same cases.
+
+    Figures over several kinds of case are of `even`, if given.
+    """
     drawn = _drawn(marks)
     asked = set(map(_case, drawn))
     beside = {name: [m for m in _drawn(held) if _case(m) in asked] for name, held in (others or {}).items()}
@@ -115,7 +129,8 @@ def told(
         "seed": seed,
         "final": final,
         "method": method,
-        "by_reality": by_reality(drawn),
+        "by_reality": by_reality(drawn, even),
+        "even_cases": len(drawn if even is None else even),
         "by_form": by_form(drawn),
         "beside": {name: by_reality(held)[ALL] for name, held in beside.items() if held},
         "same_twin": list(same_twin(marks)),
@@ -201,9 +216,9 @@ def page(values: Mapping[str, Any]) -> str:
             f"Cases: {counted}, answered by {plural(len(values['code']), 'state')} of the code. "
             "Each figure with its 95 % interval "
             "(Wilson's for shares) and how many cases, names or runs it rests on; wanted figures ask for 400 "
-            "cases each. Forms of the first reality lie near the catalogue's, those of the others were drawn "
-            "without asking how near. A far form that is called by its name is right; called unknown it is a "
-            "miss.",
+            f"cases each.{_even_words(values)} Forms of the first reality lie near the catalogue's, those of "
+            "the others were drawn without asking how near. A far form that is called by its name is right; "
+            "called unknown it is a miss.",
             "",
             f"| figure | wanted | {' | '.join(names)} |",
             f"|---|---:|{'---:|' * len(names)}",
@@ -221,6 +236,17 @@ def page(values: Mapping[str, Any]) -> str:
             "",
             *twin_lines(values["same_twin"]),
         ]
+    )
+
+
+def _even_words(values: Mapping[str, Any]) -> str:
+    """What figures over several kinds of case rest on, where kinds have different shares of cases."""
+    every = sum(count for name, count in values["cases"].items() if name != SAME_TWIN)
+    if values["even_cases"] == every:
+        return ""
+    return (
+        f" Figures over several kinds of case rest on {values['even_cases']} of them, of which each kind has "
+        "its planned share."
     )
 
 

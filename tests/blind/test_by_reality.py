@@ -62,6 +62,17 @@ def test_each_figure_is_what_one_counts(key: str, reality: str, hits: int, cases
     assert 0.0 <= row["low"] <= row["value"] <= row["high"] <= 1.0
 
 
+def test_figures_over_several_kinds_rest_on_the_even_cases_alone() -> None:
+    """One kind with more cases than planned would weigh on what is counted over all of them."""
+    found = {row["key"]: row for row in by_reality(MARKS, MARKS[:7])["all"]}
+    assert (found["false_names"]["n"], found["each_kept"]["n"], found["mass_on_true"]["n"]) == (7, 4, 4)
+    assert (found["nothing_named"]["n"], found["unknown_misnamed"]["n"], found["known_kept"]["n"]) == (
+        2,
+        1,
+        1,
+    )
+
+
 def test_the_mass_on_the_true_cause_is_shared_in_a_class_and_scaled_to_one() -> None:
     first, wrong, missed, *_ = MARKS
     assert mass_on_true(first) == pytest.approx(0.45)

@@ -155,11 +155,28 @@ WANTED = (
 """Every row of the table, in its order."""
 
 
-def by_reality(marks: Sequence[Mark]) -> dict[str, list[dict[str, Any]]]:
-    """Rows of the table for all cases and for each reality by itself."""
+def by_reality(marks: Sequence[Mark], even: Sequence[Mark] | None = None) -> dict[str, list[dict[str, Any]]]:
+    """Rows of the table for all cases and for each reality by itself.
+
+    Parameters
+    ----------
+    marks
+        Of all cases.
+    even
+        Of those on which figures over several kinds of case rest, where some kinds have more cases than
+        others; of all by default.
+    """
     names = sorted({m.truth.reality for m in marks})
-    parts = {ALL: list(marks)} | {name: [m for m in marks if m.truth.reality == name] for name in names}
-    return {name: [row(wanted, part) for wanted in WANTED] for name, part in parts.items()}
+
+    def rows(held: Callable[[Mark], bool]) -> list[dict[str, Any]]:
+        alone = list(filter(held, marks))
+        together = alone if even is None else list(filter(held, even))
+        of_one = [len(wanted.kinds) == 1 or wanted.kinds == _UNKNOWN for wanted in WANTED]
+        return [row(wanted, alone if one else together) for wanted, one in zip(WANTED, of_one)]
+
+    return {ALL: rows(lambda m: True)} | {
+        name: rows(lambda m, name=name: m.truth.reality == name) for name in names
+    }
 
 
 def by_form(marks: Sequence[Mark]) -> list[dict[str, Any]]:
