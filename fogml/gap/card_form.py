@@ -140,12 +140,14 @@ class Form:
         return np.asarray(unknowns[0] * self._usual(run, unknowns))
 
     def slopes_on(self, run: int, unknowns: FloatArray) -> FloatArray:
-        """Of what is made of a run, shape (m, unknowns), by central differences where not in proportion."""
-        moves = _MOVE * np.eye(len(unknowns))
+        """Of what is made of a run, shape (m, unknowns), by differences within the limits elsewhere."""
         columns = [self._usual(run, unknowns)] if self.declared.in_proportion else []
-        for move in moves[len(columns) :]:
-            above, below = self.on(run, unknowns + move), self.on(run, unknowns - move)
-            columns.append((above - below) / (2.0 * _MOVE))
+        for place in range(len(columns), len(unknowns)):
+            ends = np.clip(unknowns[place] + np.array([-_MOVE, _MOVE]), *self.limits[place])
+            below, above = (
+                self.on(run, np.where(np.arange(len(unknowns)) == place, end, unknowns)) for end in ends
+            )
+            columns.append((above - below) / (ends[1] - ends[0]))
         return np.column_stack(columns)
 
     def told(self, unknowns: FloatArray, errors: FloatArray) -> Fitted:
