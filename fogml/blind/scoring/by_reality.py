@@ -167,16 +167,14 @@ def by_reality(marks: Sequence[Mark], even: Sequence[Mark] | None = None) -> dic
         others; of all by default.
     """
     names = sorted({m.truth.reality for m in marks})
+    together = marks if even is None else even
+    of_one = [len(wanted.kinds) == 1 or wanted.kinds == _UNKNOWN for wanted in WANTED]
 
-    def rows(held: Callable[[Mark], bool]) -> list[dict[str, Any]]:
-        alone = list(filter(held, marks))
-        together = alone if even is None else list(filter(held, even))
-        of_one = [len(wanted.kinds) == 1 or wanted.kinds == _UNKNOWN for wanted in WANTED]
-        return [row(wanted, alone if one else together) for wanted, one in zip(WANTED, of_one)]
+    def rows(of: Sequence[str]) -> list[dict[str, Any]]:
+        alone, every = ([m for m in held if m.truth.reality in of] for held in (marks, together))
+        return [row(wanted, alone if one else every) for wanted, one in zip(WANTED, of_one)]
 
-    return {ALL: rows(lambda m: True)} | {
-        name: rows(lambda m, name=name: m.truth.reality == name) for name in names
-    }
+    return {ALL: rows(names)} | {name: rows([name]) for name in names}
 
 
 def by_form(marks: Sequence[Mark]) -> list[dict[str, Any]]:
