@@ -61,15 +61,16 @@ def main() -> None:
     for reality in () if given.page or given.answered else given.reality or choices:
         for part in _parts(config, reality):
             _do(given, config, reality, part, ledger)
-    found, marks = _found(given.directory, given.method)
+    found = _found(given.directory, given.method)
+    marks = _marks_of(found, given.method)
     if given.answered:
         suites = [BlindFolder(path.parent) for path in sorted(given.directory.glob("*/*/cases"))]
         marks = [mark for suite in suites for mark in answered_marks(suite, given.method, given.workers)]
-    others = {name: _found(given.directory, name)[1] for name in BASELINES}
-    even = None if given.answered else evenly(given.directory, given.method, config["parts"])
+    others = {name: _marks_of(_found(given.directory, name), name) for name in BASELINES}
+    even = None if given.answered else evenly(found, given.method, config["parts"])
     values = told(marks, choices, config["seed"], given.method, given.final, others, even)
     if ledger is not None:
-        hashes = "\n".join(one.truth for one in found)
+        hashes = "\n".join(one.truth for one in found.values())
         figures = {row["key"]: row["value"] for row in values["by_reality"][ALL]}
         digest = hashlib.sha256(hashes.encode()).hexdigest()
         own = {name: count for name, count in values["cases"].items() if name != SAME_TWIN}
@@ -86,17 +87,20 @@ def main() -> None:
         file.write("\n")
 
 
-def _found(directory: Path, method: str) -> tuple[list[Marks], list[Mark]]:
-    """The scored parts of a method, and their marks."""
-    found = [read_marks(path) for path in sorted(directory.glob(f"*/*/{method}-{MARKS}"))]
-    return found, [mark for one in found for mark in one.methods[method]]
+def _found(directory: Path, method: str) -> dict[Path, Marks]:
+    """The scored parts of a method, by their files."""
+    return {path: read_marks(path) for path in sorted(directory.glob(f"*/*/{method}-{MARKS}"))}
 
 
-def evenly(directory: Path, method: str, parts: Sequence[Mapping[str, Any]]) -> list[Mark]:
+def _marks_of(found: Mapping[Path, Marks], method: str) -> list[Mark]:
+    return [mark for one in found.values() for mark in one.methods[method]]
+
+
+def evenly(found: Mapping[Path, Marks], method: str, parts: Sequence[Mapping[str, Any]]) -> list[Mark]:
     """The first marks of each part: the same share of each one's planned number."""
     counts = {part["name"]: part["count"] for part in parts}
-    paths = [path for path in sorted(directory.glob(f"*/*/{method}-{MARKS}")) if path.parent.name in counts]
-    held = [(counts[path.parent.name], read_marks(path).methods[method]) for path in paths]
+    names = {path: path.parent.name for path in found if path.parent.name in counts}
+    held = [(counts[name], found[path].methods[method]) for path, name in names.items()]
     share = min((len(marks) / count for count, marks in held), default=0.0)
     return [mark for count, marks in held for mark in marks[: round(share * count)]]
 

@@ -17,6 +17,7 @@ from fogml.errors import InputError, listed
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
 from fogml.runs.findings import DEAD, FIRST_OF_ALL
+from fogml.runs.names import renamed
 from fogml.runs.run import Run
 
 Check = Callable[[Sequence[Run]], None]
@@ -95,13 +96,6 @@ def folders_apart(paths: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _within(folders: str, run: Run) -> Run:
-    """The run with folders before its name."""
-    if not folders:
-        return run
-    return Run.derived(folders + run.name, run.columns, run.facts, run.gyro_unit, run.findings)
-
-
 def open_each(
     paths: Sequence[str],
     *,
@@ -114,7 +108,8 @@ def open_each(
     folders, runs = folders_apart(paths), []
     for path in paths:
         doing(f"reading {path}")
-        runs.append(_within(folders[path], open_run(path, repair=repair, axis=axis)))
+        run = open_run(path, repair=repair, axis=axis)
+        runs.append(renamed(run, folders[path] + run.name))
     return runs
 
 
@@ -141,7 +136,8 @@ def open_runs(
     with terminal.work("reading", total=len(paths)) as work:
         for path in paths:
             work.doing(f"reading {path}")
-            runs += [_within(folders[path], run) for run in open_legs(path, repair=repair, axis=axis)]
+            legs = open_legs(path, repair=repair, axis=axis)
+            runs += [renamed(leg, folders[path] + leg.name) for leg in legs]
             work.advance()
     note_findings(runs, terminal)
     return runs

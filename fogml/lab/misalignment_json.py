@@ -12,9 +12,9 @@ from fogml.lab.misalignment import Misalignment, TableMeasurements, decouple, fi
 from fogml.lab.misalignment_errors import LEVEL
 from fogml.lab.misalignment_states import STATES
 from fogml.numerals import percent, short
+from fogml.runs.columns import REPLAYED, column_spec
 
 _SAME_TILT_DEG = 0.05
-_PER_DEG_H = {"deg/h": 1.0, "deg/s": 3600.0, "rad/s": 3600.0 * 180.0 / np.pi}
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,9 @@ def _doubts(
         Share by which no gyro misses the scale factor of the unit that its output is stated in.
     """
     doubts = []
-    expected = 3600.0 / _PER_DEG_H.get(measured.unit, np.nan)
+    spec = column_spec(REPLAYED)  # whose units are those of rates, and no counts
+    assert spec is not None
+    expected = 3600.0 / spec.units.get(measured.unit, (np.nan, 0.0))[0]
     if abs(found.K / expected - 1.0) > far:
         doubts.append(
             f"K is {short(found.K, 4)} where an output in {measured.unit} shows about {short(expected, 4)}: "

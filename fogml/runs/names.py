@@ -7,6 +7,13 @@ from collections.abc import Sequence
 from fogml.runs.run import Run
 
 
+def renamed(run: Run, name: str) -> Run:
+    """The run under another name; itself where that is its own."""
+    if name == run.name:
+        return run
+    return Run.derived(name, run.columns, run.facts, run.gyro_unit, run.findings)
+
+
 def named_apart(*groups: Sequence[Run]) -> tuple[list[Run], ...]:
     """The groups of runs, each under a name of its own: the second ``run.csv`` is ``run.csv (2)``.
 
@@ -20,6 +27,6 @@ def named_apart(*groups: Sequence[Run]) -> tuple[list[Run], ...]:
             count += 1
             name = f"{run.name} ({count})"
         taken.add(name)
-        return run if count == 1 else Run.derived(name, run.columns, run.facts, run.gyro_unit, run.findings)
+        return renamed(run, name)
 
     return tuple([named(run) for run in group] for group in groups)

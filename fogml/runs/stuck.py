@@ -74,15 +74,16 @@ def _frozen(run: Run) -> Iterator[Finding]:
     true = np.flatnonzero(same)
     edges = np.flatnonzero(np.diff(true) > 1)
     lengths = np.diff(edges, prepend=-1, append=len(true) - 1) + 1
+    starts = true[np.concatenate(([0], edges + 1))]
     if turned:  # coarse counts rest at one value while the table stands
-        yield from _unmoved(run, true[np.concatenate(([0], edges + 1))], lengths)
+        yield from _unmoved(run, starts, lengths)
         return
     ordinary = int(np.max(lengths, where=lengths < FROZEN_SAMPLES, initial=1))
     found = np.flatnonzero(lengths >= max(FROZEN_SAMPLES, FROZEN_RATIO * ordinary))
     count = int(lengths[found].sum())
     others = len(same) - len(true) + 1 - len(found)
     if len(found) and others >= _LEAST_SPELLS and len(gyro) - count <= _NOISY_SPELL * others:
-        first = int(true[np.concatenate(([0], edges + 1))[found[0]]])
+        first = int(starts[found[0]])
         spells = "" if len(found) == 1 else f", and {counted(len(found) - 1, 'time')} more"
         message = (
             f"'gyro' stays at {gyro[first]:.6g} for {lengths[found[0]]} samples from {run.time[first]:.10g} "

@@ -76,12 +76,7 @@ def term_interval(search: NoiseSearch, name: str, level: float) -> tuple[float, 
                 far = limit
             at_far = root(far) - most
             if at_far > 0.0:
-                return _crossing(
-                    lambda at: root(at) - most,
-                    (near, at_near),
-                    (far, at_far),
-                    2e-2 * min(scale, max(value, scale)),
-                )
+                return _crossing(lambda at: root(at) - most, (near, at_near), (far, at_far), 2e-2 * scale)
             if far == limit:
                 return limit
             near, at_near = far, at_far

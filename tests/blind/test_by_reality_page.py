@@ -52,7 +52,7 @@ def test_the_even_cases_are_the_first_of_each_part_by_its_planned_count(tmp_path
         whole = Marks(1, (10.0,), (part_of(truths, "0" * 64),), truths, {"diagnosis": held})
         write_marks(folder / f"diagnosis-{FILE}", whole)
     parts = [{"name": "one", "count": 4}, {"name": "two", "count": 2}]
-    even = experiment.evenly(tmp_path, "diagnosis", parts)
+    even = experiment.evenly(experiment._found(tmp_path, "diagnosis"), "diagnosis", parts)
     assert [(m.truth.kind, m.truth.case) for m in even] == [
         *(("one", f"{i:04d}") for i in range(4)), ("two", "0000"), ("two", "0001"),
     ]  # fmt: skip
