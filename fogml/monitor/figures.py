@@ -9,12 +9,14 @@ from scipy.special import digamma, polygamma
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.models.base import DriftModel
-from fogml.signals.noise_fit import NoiseFit, fit_noise
+from fogml.signals.noise_fit import fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
 
 _DRAWS = 16
 """Noise models drawn to tell how well the run tells its noise: degrees of freedom to a third."""
+_ALIKE = 1e-6
+"""Rates that differ by no more than this share are the same: far below what a table's rate is told to."""
 
 
 @dataclass(frozen=True)
@@ -59,21 +61,28 @@ def run_figures(averages: Averages, model: DriftModel, *, outside_deviation: flo
     more than what the model states: over the trained range it adds the deviation of the model's intervals.
     Averages outside training tell a level alone, as well as the model's interval there states
     (`outside_deviation`, deg/h).
+
+    Where the table turns in some of these, the scale factor is fitted with them. A table that turns
+    alike in all of them tells neither level nor scale factor, as each looks as the other does.
     """
     used = averages.used
     time, left = averages.time[used], averages.left[used]
     if np.ptp(left) == 0.0:
         return _still(float(left[0]))
-    columns, priors = _columns(model, time, averages.temperature[used], averages.averaging_s)
+    columns, priors = _columns(model, averages)
+    reference = averages.reference[used]
+    turned = bool(averages.moving[used].any())
+    alike = turned and bool(np.ptp(reference) <= _ALIKE * np.abs(reference).max())
+    if turned and not alike:
+        columns["scale_factor"] = 1e-6 * averages.reference
+        priors = np.append(priors, np.inf)
     names = list(columns)
-    table = np.stack([np.ones(len(time)), *columns.values()], axis=1)
+    every = np.stack([np.ones(len(used)), *columns.values()], axis=1)
+    table = every[used]
     noise = fit_noise([time], [left], [table[:, 1:]], averaging_s=averages.averaging_s)
     models = [noise.model, *noise.draw(np.random.default_rng(0), _DRAWS)]
     fits = [_fit(one, time, averages.averaging_s, table, left, priors) for one in models]
-    found = dict.fromkeys(
-        [f"{name}{end}" for name in ("level", "temperature_slope", "rate_slope") for end in ("", "_se")],
-        np.nan,
-    )
+    found = _untold()
     for i, name in enumerate(["level", *names]):
         found[name] = fits[0].values[i]
         found[f"{name}_se"] = _of_student([fit.errors[i] for fit in fits])
@@ -86,30 +95,38 @@ def run_figures(averages: Averages, model: DriftModel, *, outside_deviation: flo
     found["scatter_se"] = 0.5 * float(np.sqrt(polygamma(1, free / 2)))
     if outside_deviation:
         found["level_se"] = float(np.hypot(found["level_se"], outside_deviation))
-        for name in ("temperature_slope", "rate_slope", "scatter"):
+        for name in ("temperature_slope", "rate_slope", "scatter", "scale_factor"):
             found[name] = found[f"{name}_se"] = float("nan")
-    found["scale_factor"], found["scale_factor_se"] = _scale_factor(averages, noise, models, found)
+    if alike:
+        found["level"] = found["level_se"] = float("nan")
+    if not turned:
+        found["scale_factor"], found["scale_factor_se"] = _by_turns(
+            averages, every, models, fits, outside_deviation
+        )
     return found
+
+
+def _untold() -> dict[str, float]:
+    names = ("level", "temperature_slope", "rate_slope", "scatter", "scale_factor")
+    return {f"{name}{end}": float("nan") for name in names for end in ("", "_se")}
 
 
 def _still(level: float) -> dict[str, float]:
     """Of an output that does not move: no noise, so that nothing tells how well it is told."""
-    names = ("temperature_slope", "rate_slope", "scatter", "scale_factor")
-    ends = {f"{name}{end}": float("nan") for name in ("level", *names) for end in ("", "_se")}
-    return {**ends, "level": level}
+    return {**_untold(), "level": level}
 
 
-def _columns(
-    model: DriftModel, time: FloatArray, temperature: FloatArray, averaging_s: float
-) -> tuple[dict[str, FloatArray], FloatArray]:
+def _columns(model: DriftModel, averages: Averages) -> tuple[dict[str, FloatArray], FloatArray]:
     """Regressors of the slopes that the run moves along, and what deviation each slope has by the model."""
-    rate = _rate(time, temperature, averaging_s)
+    temperature = averages.temperature
+    rate = _rate(averages.time, temperature, averages.averaging_s)
     deviation = float(model.intervals_.half_width(0.68))
     columns, priors = {}, []
     for name, atom, values in (("temperature_slope", "T", temperature), ("rate_slope", "dT", rate)):
-        if not np.ptp(values) > 0.0:
+        told = values[averages.used]
+        if not np.ptp(told) > 0.0:
             continue
-        low, high = model.card_.box.get(atom, (values.min(), values.max()))
+        low, high = model.card_.box.get(atom, (told.min(), told.max()))
         middle = 0.5 * (low + high) if atom == "T" else 0.0
         columns[name] = values - middle
         # Over an evenly covered range, a slope of 1 has the deviation of its span over the root of 12.
@@ -119,11 +136,16 @@ def _columns(
 
 @dataclass(frozen=True)
 class _Fit:
-    """Constants [level, slopes], their standard errors, and the log deviation of an innovation."""
+    """Constants [level, slopes], their standard errors, and the log deviation of an innovation.
+
+    `together` and `covariance` are constants with what the model states of the slopes.
+    """
 
     values: FloatArray
     errors: FloatArray
     innovation: float
+    together: FloatArray
+    covariance: FloatArray
 
 
 def _fit(
@@ -146,7 +168,7 @@ def _fit(
     left_over = y - columns @ slopes
     free = len(y) - columns.shape[1]
     scale = 0.5 * np.log(float(left_over @ left_over) / free)
-    return _Fit(values, errors, whitener.log_det / len(y) + scale)
+    return _Fit(values, errors, whitener.log_det / len(y) + scale, level, known)
 
 
 def _solved(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -174,22 +196,29 @@ def _rate(time: FloatArray, temperature: FloatArray, averaging_s: float) -> Floa
     return rate
 
 
-def _scale_factor(
-    averages: Averages, noise: NoiseFit, models: list[NoiseModel], found: dict[str, float]
+def _by_turns(
+    averages: Averages,
+    table: FloatArray,
+    models: list[NoiseModel],
+    fits: list[_Fit],
+    outside_deviation: float,
 ) -> tuple[float, float]:
-    """Error of the scale factor [ppm] by the averages at which the table turns, and its standard error."""
+    """Error of the scale factor [ppm] by the averages at which the table turns, and its standard error.
+
+    Level and slopes, of which `table` holds the regressors, are told by the others.
+    """
     moving = averages.moving
     reference = averages.reference[moving]
     power = float(reference @ reference)
     if not power > 0.0:
         return float("nan"), float("nan")
-    level = 0.0 if np.array_equal(moving, averages.used) else found["level"]
     weights = 1e6 * reference / power
+    of_constants = weights @ table[moving]
 
-    def error(model: NoiseModel) -> float:
+    def deviation(model: NoiseModel, fit: _Fit) -> float:
         coloured = Whitener(model, averages.time[moving], averages.averaging_s).colour_adjoint(weights)
-        return float(np.linalg.norm(coloured))
+        return float(np.sqrt(coloured @ coloured + of_constants @ fit.covariance @ of_constants))
 
-    of_level = found["level_se"] * abs(float(weights.sum())) if level else 0.0
-    own = _of_student([error(model) for model in models])
-    return float(weights @ (averages.left[moving] - level)), float(np.hypot(own, of_level))
+    told = _of_student([deviation(model, fit) for model, fit in zip(models, fits, strict=True)])
+    error_ppm = float(weights @ averages.left[moving] - of_constants @ fits[0].together)
+    return error_ppm, float(np.hypot(told, outside_deviation * of_constants[0]))

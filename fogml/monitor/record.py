@@ -71,14 +71,16 @@ class RunRecord:
         Averaging time of the figures [s].
     level
         What is left in the middle of the trained temperatures at rest [deg/h]; of the run's where the model
-        has no such range. By generalised least squares under the run's own noise.
+        has no such range. By generalised least squares under the run's own noise; NaN where the table turns
+        alike throughout.
     temperature_slope, rate_slope
         Slopes of what is left against temperature [deg/h/degC] and rate of temperature [deg/h/(degC/min)],
         fitted together; NaN where the run tells them less well than the model states them.
     scatter
         Natural logarithm of the deviation of an average from what those before it foretell [ln(deg/h)].
     scale_factor
-        Error of the scale factor by the turns [ppm]; NaN where the table does not turn.
+        Error of the scale factor by the turns [ppm]; NaN where the table does not turn, or turns alike
+        throughout.
     level_se, temperature_slope_se, rate_slope_se, scatter_se, scale_factor_se
         How well the run tells each: standard error in its unit, the noise being estimated from the same run.
     """

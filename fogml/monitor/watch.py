@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError, listed
+from fogml.errors import listed
 from fogml.intervals import TAILS
 from fogml.monitor.changes import Chart, Shape, change_chart
 from fogml.monitor.evidence import ChangePrior, flicker_covariance
@@ -185,11 +185,6 @@ def watch(
         90 % interval.
     prior
         What is taken for granted of changes.
-
-    Raises
-    ------
-    InputError
-        If only some of a unit's runs have a time zone.
     """
     ordered = sorted(records, key=lambda record: (record.unit, record.axis))
     return [
@@ -202,14 +197,22 @@ def _watched(
     records: list[RunRecord], between: float, bias_limit: float | None, prior: ChangePrior
 ) -> UnitWatch:
     unset = [record.run for record in records if clock_not_set(record)]
-    records, age, dated = _in_order(records)
+    started = [datetime.fromisoformat(record.started) for record in records if record.started]
+    zones = len({moment.tzinfo is None for moment in started}) > 1
+    dated = len(started) == len(records) and not unset and not zones
+    records, age = _in_order(records, dated)
     notes = []
+    if zones:
+        notes.append(
+            "'started' has a time zone in some of the runs only: they stand in the order in which they were "
+            "monitored; add it in their side files and give the runs again"
+        )
     if unset:
         notes.append(
             f"{listed(unset, 3)}: 'started' is what a clock says that was never set, and so not taken; mend "
             "it in the side file and give the run again"
         )
-    if not dated and len(records) > 1:
+    if not dated and not zones and len(records) > 1:
         notes.append(
             "not every run says when it began: they stand in the order in which they were monitored; "
             "state 'started' in their side files and give the runs again"
@@ -260,32 +263,30 @@ def clock_not_set(record: RunRecord) -> bool:
     return any(timedelta(0) <= started - epoch < UNSET_CLOCK for epoch in EPOCHS)
 
 
-def _in_order(records: Sequence[RunRecord]) -> tuple[list[RunRecord], FloatArray, bool]:
-    """Runs by when they began, with the unit's age [d]; by when they were monitored if one does not say."""
-    if not all(record.started and not clock_not_set(record) for record in records):
+def _in_order(records: Sequence[RunRecord], dated: bool) -> tuple[list[RunRecord], FloatArray]:
+    """Runs by when they began, with the unit's age [d]; by when they were monitored if not all say.
+
+    Of one run under two models the later record is the last: which model counts is no matter of chance.
+    """
+    if not dated:
         placed = sorted(records, key=lambda record: (record.monitored, record.run, record.key))
-        return placed, np.arange(float(len(placed))), False
+        return placed, np.arange(float(len(placed)))
     moments = {record.key: datetime.fromisoformat(record.started) for record in records}
-    try:
-        placed = sorted(records, key=lambda record: (moments[record.key], record.key))
-    except TypeError:
-        raise InputError(
-            f"{records[0].label}: 'started' has a time zone in some of the runs only; add it"
-        ) from None
+    placed = sorted(records, key=lambda record: (moments[record.key], record.monitored, record.key))
     first = moments[placed[0].key]
-    return placed, np.array([(moments[r.key] - first).total_seconds() / DAY_S for r in placed]), True
+    return placed, np.array([(moments[r.key] - first).total_seconds() / DAY_S for r in placed])
 
 
 def _calibration(age: FloatArray, level: FloatArray, limit: float, wanders: bool) -> Calibration | None:
-    """When a line through the levels passes a limit; None for fewer than four runs."""
-    n = len(age)
-    if n < 4 or not np.ptp(age) > 0.0:
+    """When a line through the levels passes a limit; None for fewer than four runs that tell theirs."""
+    told = np.isfinite(level)
+    if told.sum() < 4 or not np.ptp(age[told]) > 0.0:
         return None
-    trend, (low, high) = trend_interval(age, level, wanders=wanders)
+    trend, (low, high) = trend_interval(age[told], level[told], wanders=wanders)
 
     def due(slope: float) -> float:
         """Days from the last run until a line of that slope has gone as far as the limit."""
-        days = limit / abs(slope) - float(np.ptp(age)) if slope else np.inf
+        days = limit / abs(slope) - float(age[-1] - age[told][0]) if slope else np.inf
         return max(days, 0.0) if days <= LONGEST_DAYS else float("inf")
 
     latest = float("inf") if low <= 0.0 <= high else due(min(low, high, key=abs))

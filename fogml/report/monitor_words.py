@@ -109,6 +109,7 @@ _UNITS = {
 def run_figures(unit: Mapping[str, Any]) -> Drawing:
     """Every figure over the unit's age, with the changes and the runs that they were noticed with."""
     told = [name for name in FIGURE_WORDS if any(run[name] is not None for run in unit["runs"])]
+    told = told or ["level"]
     figure = style.stacked([1.0] * len(told), 0.16 / len(told))
     age = unit["age"]
     for row, name in enumerate(told, start=1):

@@ -55,6 +55,29 @@ def test_a_run_whose_temperature_stays_tells_no_slopes(model, tmp_path):
     assert record.level_se > record_run(model, [run]).level_se
 
 
+@pytest.mark.parametrize("half_period_s", [350.0, 1000.0])
+def test_a_table_that_seldom_rests_tells_bias_and_scale_factor_apart(model, tmp_path, half_period_s):
+    """Else the bias holds turns that do not cancel, and the scale factor the bias, both told as certain."""
+    run = read_run(write_run(tmp_path, 14))
+    table = np.where((run.time // half_period_s) % 2 > 0.5, 10.0, -10.0)
+    turned = run.with_columns(rate=table, gyro=run.gyro + 1.0 + 3600.0 * table * (1.0 + 50e-6))
+    told, rested = record_run(model, [turned]), record_run(model, [run])
+    assert told.level - rested.level == pytest.approx(1.0, abs=3.0 * told.level_se)
+    assert told.scale_factor == pytest.approx(50.0, abs=3.0 * told.scale_factor_se)
+    assert told.level_se < 0.1 and told.scale_factor_se < 3.0
+    # One way throughout, a bias of 1 deg/h looks as 28 ppm do.
+    one_way = run.with_columns(rate=np.full(len(run), 10.0), gyro=run.gyro + 36000.0)
+    neither = record_run(model, [one_way])
+    assert np.isnan(neither.level) and np.isnan(neither.scale_factor)
+    assert neither.scatter == pytest.approx(rested.scatter, abs=0.01)
+
+
+def test_a_slope_that_changed_is_no_scale_factor(model, tmp_path):
+    """Where the table turns it is 20 degC off the middle: 0.02 deg/h/degC looked as 11 ppm."""
+    run = read_run(write_run(tmp_path, 15, slope=0.07, noise=1e-3, rate=10.0))
+    assert record_run(model, [run]).scale_factor == pytest.approx(50.0, abs=1.0)
+
+
 def test_standard_errors_are_those_of_repeated_runs(model, tmp_path):
     run = read_run(write_run(tmp_path, 10, noise=0.0))
     records = []

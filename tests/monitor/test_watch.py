@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogml.errors import InputError
 from fogml.monitor.monitor_json import monitor_json
 from fogml.monitor.watch import watch
 from fogml.report.monitor_page import monitor_page, unit_file, unit_page
@@ -105,9 +104,37 @@ def test_runs_without_a_date_stand_as_they_were_monitored():
     assert [r.run for r in unit.records] == [f"{n:02d}.csv" for n in range(6)]
     assert "side files" in unit.notes[0]
     assert unit.calibration is None
+
+
+def test_a_time_zone_that_some_runs_lack_holds_up_no_other_unit():
     mixed = [replace(r, started=r.started[:19] if i else r.started) for i, r in enumerate(service(6))]
-    with pytest.raises(InputError, match="time zone"):
-        watch(mixed)
+    unit, other = watch([*mixed, *service(6, unit="FOG-2")])
+    assert not unit.dated and "time zone" in unit.notes[0] and len(unit.notes) == 1
+    assert other.dated and not other.notes
+
+
+@pytest.mark.parametrize("key", ["A", "z"])
+def test_runs_given_again_with_a_new_model_are_those_of_the_new(key):
+    """The last run stands under both: before, the smaller digest of the two decided."""
+    again = [
+        replace(r, key=key + r.key, model="new", monitored="2026-05-01T08:00:00+00:00") for r in service(8)
+    ]
+    (unit,) = watch([*service(8), *again])
+    assert {r.model for r in unit.records} == {"new"} and len(unit.records) == 8
+
+
+def test_runs_that_tell_no_bias_are_left_out_of_the_calibration():
+    records = service(12)
+    gone = [
+        replace(r, level=float("nan"), level_se=float("nan")) if i in (3, 5) else r
+        for i, r in enumerate(records)
+    ]
+    (unit,), (rest,) = watch(gone), watch([r for i, r in enumerate(records) if i not in (3, 5)])
+    assert unit.calibration == rest.calibration
+    (nothing,) = watch(
+        [replace(r, level=float("nan"), scatter=float("nan"), rate_slope=float("nan")) for r in records]
+    )
+    assert nothing.calibration is None and "Run by run" in unit_page(values_of([nothing])["units"][0], 1000.0)
 
 
 @pytest.mark.parametrize(
