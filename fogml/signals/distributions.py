@@ -76,7 +76,7 @@ def students_ppf(
     of which is 0, or of the probability's shape and m.
     """
     asked = np.asarray(probability)
-    ends = centres + scales * student_ppf(asked, float(np.min(freedom)))[..., None]
+    ends = centres + scales * student_ppf(asked[..., None], freedom)
     low, high = ends.min(axis=-1), ends.max(axis=-1)
     while np.any(high - low > 1e-12 * np.maximum(np.abs(low), np.abs(high))):
         middle = 0.5 * (low + high)

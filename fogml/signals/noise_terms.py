@@ -210,12 +210,11 @@ def _ramp(search: NoiseSearch, walk: NoiseTerm, level: float, ramps: int | None)
     """The ramp, where it is told from none and from a random walk."""
     from scipy.special import ndtri
 
-    found = ramp(search, walk.upper / _SCALES["K"], search.spectrum.removed, ramps)
+    off = float(ndtri(0.5 + 0.5 * level))
+    found = ramp(search, walk.upper / _SCALES["K"], search.spectrum.removed, ramps, off)
     if found is None:
         return NoiseTerm(None, 0.0, 0.0, _UNITS["R"], 0.0)
-    size, error = (_SCALES["R"] * value for value in found)
-    half = float(ndtri(0.5 + 0.5 * level)) * error
-    lower, upper = max(size - half, 0.0), size + half
+    size, lower, upper = (_SCALES["R"] * value for value in found)
     return NoiseTerm(size if lower > 0.0 else None, lower, upper, _UNITS["R"], size if lower > 0.0 else 0.0)
 
 

@@ -39,13 +39,16 @@ def slow_fits(model: SpectrumModel, names: Sequence[str]) -> tuple[list[Spectrum
 
 
 def ramp(
-    search: NoiseSearch, walk_upper: float, removed: FloatArray, ramps: int | None
-) -> tuple[float, float] | None:
-    """The ramp and its standard error [deg/h/s], or None without one.
+    search: NoiseSearch, walk_upper: float, removed: FloatArray, ramps: int | None, off: float
+) -> tuple[float, float, float] | None:
+    """The ramp and the ends of its interval [deg/h/s], or None without one.
 
-    It is that of the best fit: of several runs the root mean square of theirs. A walk that a series of its
-    length does not show moves its two ends apart as a ramp does, so that the error is averaged over walks,
-    likelihoods as weights.
+    It is that of the best fit: of several runs the root mean square of theirs, less what errors add to it. A
+    walk that a series of its length does not show moves its two ends apart as a ramp does, so that the error
+    is averaged over walks, likelihoods as weights.
+
+    The length of k ramps in units of their error is nearly normal, of deviation 1 at most, about the root of
+    the true length's square and k - 1.
 
     Parameters
     ----------
@@ -57,6 +60,8 @@ def ramp(
         What was taken off the constants before [deg/h/s].
     ramps
         How many of the constants are ramps; all if None.
+    off
+        Standard errors from the ramp to either end.
     """
     best = search.best
     count = len(best.constants) if ramps is None else min(ramps, len(best.constants))
@@ -65,12 +70,17 @@ def ramp(
     model, place = search.candidates[0].model, best.terms.names.index("K")
     sizes = np.linspace(0.0, _BEYOND * walk_upper, _SIZES)
     fits = _at_sizes(model, best, place, sizes, search.excess) or [best]
-    variances = [
-        np.trace(fit.covariance[:count, :count]) + np.sum((fit.constants - best.constants)[:count] ** 2)
-        for fit in fits
+    scatter = [
+        np.diag(fit.covariance)[:count] + (fit.constants - best.constants)[:count] ** 2 for fit in fits
     ]
+    variances = _likelihoods(fits) @ scatter
+    # As many ramps of one error as scatter alike (F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110).
+    each = float(variances @ variances) / max(float(variances.sum()), 1e-300)
     size = np.sqrt(np.mean((best.constants + removed)[:count] ** 2))
-    return float(size), float(np.sqrt(_likelihoods(fits) @ variances) / count)
+    lengths = np.maximum(size + np.array([0.0, -off, off]) * np.sqrt(each / count), 0.0)
+    added = max(float(variances.sum()) - each, 0.0) / count
+    found, lower, upper = np.sqrt(np.maximum(lengths**2 - added, 0.0)).tolist()
+    return found, lower, upper
 
 
 def _at_sizes(

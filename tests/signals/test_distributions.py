@@ -51,6 +51,10 @@ def test_a_mixture_of_students() -> None:
     for probability in (0.05, 0.5, 0.95):
         value = own.students_ppf(probability, weights, centres, scales, 7.0)
         assert weights @ stats.t.cdf((value - centres) / scales, 7.0) == pytest.approx(probability, abs=1e-9)
+        # About one place the quantile lies between those of the most and the fewest degrees of freedom.
+        freedom = np.array([1.0, 30.0, 100.0])
+        value = own.students_ppf(probability, weights, np.zeros(3), np.ones(3), freedom)
+        assert weights @ stats.t.cdf(value, freedom) == pytest.approx(probability, abs=1e-9)
     assert own.students_ppf(0.95, np.ones(1), np.zeros(1), np.ones(1), 7.0) == pytest.approx(
         stats.t.ppf(0.95, 7)
     )

@@ -160,6 +160,23 @@ def test_a_random_walk_that_hardly_shows_is_no_ramp():
         assert told.upper - 0.5 * (told.upper + told.lower) * (told.lower > 0.0) > 0.8 * 1.645 * error
 
 
+@pytest.mark.parametrize("ramp", [0.0, 0.02])
+def test_ramps_of_many_runs_are_not_their_errors(ramp: float):
+    """The root mean square of estimates exceeds that of the ramps by what errors add."""
+    runs, count = 20, 400
+    hits = []
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        turns = ramp * rng.choice([-1.0, 1.0], runs)
+        parts = [rng.normal(size=count) + turn * np.arange(count) for turn in turns]
+        lines = [np.outer(np.arange(count), np.arange(runs) == i) for i in range(runs)]
+        segments = [(i * count, (i + 1) * count) for i in range(runs)]
+        allan = allan_deviation(np.concatenate(parts), 1.0, segments=segments)
+        told = noise_terms(spectrum_of(parts, 1.0, lines), allan, ramps=runs).terms["R"]
+        hits.append(told.lower <= HOUR * ramp <= told.upper and (told.value is None) == (ramp == 0.0))
+    assert all(hits)
+
+
 def test_a_sinusoid_is_told_apart_and_noise_of_another_kind_widens_the_intervals():
     rng = np.random.default_rng(4)
     rate = gyro(rng, 40_000, N=0.01)
