@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fogml.arrays import FloatArray
+from fogml.arrays import BoolArray, FloatArray
 from fogml.gap.cards import Card, beside_others
-from fogml.gap.field import Member
+from fogml.gap.field import Field, Member
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
-from fogml.gap.linear_gaussian import Posterior
+from fogml.gap.linear_gaussian import LinearGaussian
 from fogml.gap.posterior import Cause
 from fogml.gap.result import NAMED, Estimate, Found, RunAmplitude
 from fogml.gap.result_parts import Onset
@@ -27,7 +27,7 @@ def found_cause(
     scene, settings = found.scene, found.setting.priors.reported
     declared = scene.candidates[cause.ids[0]]
     _, high = declared.amplitude.range(scene.grade)
-    by_run = _by_run(found, cause, card.lacking)
+    by_run = _by_run(found, every, cause, card.lacking)
     return Found(
         effect=cause.ids[0],
         stage=declared.stage,
@@ -51,23 +51,28 @@ def found_cause(
     )
 
 
-def _by_run(found: Inference, cause: Cause, amplitude: float) -> tuple[RunAmplitude, ...]:
-    """Amplitude that each run asks for, constants free in each, the form and the rest as found."""
+def _by_run(found: Inference, every: Foretold, cause: Cause, amplitude: float) -> tuple[RunAmplitude, ...]:
+    """Amplitude that each run asks for beside all else, which is anew in each; the form as found."""
     held = found.field
-    design = held.design(cause.members)
-    first = held.fixed.shape[1]
-    course = design[:, first:] @ Posterior.of(design, held.base.data).mean[first:]
+    rest = held.design(m for m in every.members if m not in cause.members)
+    course = held.design(every.members) @ np.where(_columns_of(held, every, cause), every.posterior.mean, 0.0)
     rows = []
     for r, span in zip(found.scene.fit, found.setting.spans):
-        fixed, part, data = held.fixed[span], course[span], held.base.data[span]
-        basis, _ = np.linalg.qr(fixed + 1e-12)
-        beside = part - basis @ (basis.T @ part)
-        size = float(beside @ beside)
+        alone = LinearGaussian.of(held.base.data[span]).beside(rest[span])
+        part = course[span][:, None]
+        size = float(alone.gram(part)[0, 0])
         if size > found.setting.priors.reported.shown:
-            scale = float(beside @ data) / size
+            scale = float(alone.fits(part)[0]) / size
             se = float(np.hypot(size**-0.5, found.setting.priors.form_error * scale))
             rows.append(RunAmplitude(r.run.name, amplitude * scale, abs(amplitude) * se))
     return tuple(rows)
+
+
+def _columns_of(held: Field, every: Foretold, cause: Cause) -> BoolArray:
+    """Which coefficients of causes together are one cause's, shape (q,)."""
+    told = [np.zeros(held.fixed.shape[1], dtype=np.bool_)]
+    told += [np.full(held.block(m.node).shape[1], m in cause.members) for m in every.members]
+    return np.concatenate(told)
 
 
 def agree(by_run: Sequence[RunAmplitude], least: float = Reported.disagree) -> bool:

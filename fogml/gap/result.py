@@ -42,7 +42,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RunAmplitude:
-    """An effect's amplitude from one run alone, the other effects and constants as found."""
+    """An effect's amplitude from one run alone, its form as found, all else anew."""
 
     run: str
     value: float

@@ -1,5 +1,6 @@
 """Sizes by run: whether they agree, and whether they grow."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,10 @@ import pytest
 from scipy.stats import chi2
 
 from fogml.gap.cards import _step, card_of
-from fogml.gap.causes import agree, growth
+from fogml.gap.causes import _by_run, agree, growth
+from fogml.gap.field import Field, Member
+from fogml.gap.frame import with_form_errors
+from fogml.gap.how_far import Foretold
 from fogml.gap.inference import foreseen
 from fogml.gap.model import TwinModel
 from fogml.gap.result import RunAmplitude
@@ -76,3 +80,45 @@ def test_a_form_that_the_runs_cannot_show_has_no_share_in_a_size():
     assert card.amplitude_se == pytest.approx(
         np.hypot(size, field.base.gram(column[:, None])[0, 0] ** -0.5), rel=0.05
     )
+
+
+def test_a_size_from_one_run_is_the_weighed_one_beside_all_else_that_acts():
+    """Against dense generalised least squares; a second cause and errors of the form beside it."""
+    time = 30.0 * np.arange(800)
+    runs = [
+        Run.from_columns(
+            f"r{i}",
+            time=time,
+            gyro=np.zeros(800),
+            T=25.0 + hot * np.sin(time / 4000.0) + 10.0 * np.sin(time / 1500.0 + i),
+        )
+        for i, hot in enumerate((20.0, 30.0))
+    ]
+    search = foreseen(TwinModel(load_twin("nominal")), runs, NoiseModel(0.005, 0.0, 0.0), STANDARD)
+    held = search.field
+    setting = with_form_errors(held.setting, NoiseModel(0.005, 0.0, 0.0), 500.0)
+    held = Field(setting, held.columns, NoiseModel(0.005, 0.0, 0.0))
+    first, second = (
+        next(i for i, n in enumerate(held.columns.nodes) if held.columns.families[n.family].id == id)
+        for id in ("thermal_hysteresis", "polarization_nonreciprocity")
+    )
+    own, other = (Member(held.columns.nodes[i].family, i, 300.0) for i in (first, second))
+    form = np.random.default_rng(1).standard_normal(held.block(first).shape[1])
+    course, beside = held.block(first) @ form, held.block(second) @ np.array([2.0, 1.0])
+    factor = np.repeat([1.0, 1.4], [len(r) for r in setting.scene.fit])
+    noise = np.random.default_rng(2).standard_normal(len(course))
+    held.base = replace(held.base, data=100.0 * factor * course + 200.0 * beside + noise)
+    found = SimpleNamespace(field=held, scene=setting.scene, setting=setting)
+    every = Foretold.of(found, (own, other))
+    sizes = _by_run(found, every, SimpleNamespace(members=(own,)), 0.2)
+    ends = np.cumsum([held.fixed.shape[1], held.block(first).shape[1]])
+    told = 300.0 * held.block(first) @ every.posterior.mean[ends[0] : ends[1]]
+    for size, span in zip(sizes, setting.spans, strict=True):
+        rest = np.concatenate([held.fixed[span], 300.0 * held.block(second)[span]], axis=1)
+        weights = np.linalg.inv(np.eye(len(rest)) + rest @ rest.T)
+        square = told[span] @ weights @ told[span]
+        scale = told[span] @ weights @ held.base.data[span] / square
+        assert size.value == pytest.approx(0.2 * scale, rel=1e-6)
+        assert size.se == pytest.approx(0.2 * np.hypot(square**-0.5, STANDARD.form_error * scale), rel=1e-6)
+    ratio = sizes[1].value / sizes[0].value
+    assert ratio == pytest.approx(1.4, abs=3.0 * np.hypot(sizes[0].se, sizes[1].se) / sizes[0].value)
