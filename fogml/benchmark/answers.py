@@ -24,6 +24,8 @@ ABOUT = "about.json"
 _DIGITS = "%.10g"
 _MOST_BYTES_A_ROW = 128
 """Two numbers of all their digits take under 60 bytes; what is larger is no answer and is not read."""
+_BELOW = 1e100
+"""Of any number's size [deg/h]: squares of larger ones and their sums are no longer finite."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ def _numbers(lines: list[str], cells: tuple[str, ...], path: Path) -> FloatArray
         values = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
     except ValueError:
         values = np.empty((0, 0))
-    sound = values.shape == (len(lines), len(cells)) and np.isfinite(values).all()
+    sound = values.shape == (len(lines), len(cells)) and bool(np.all(np.abs(values) < _BELOW))
     if sound and not np.any(values[:, 1:] < 0.0):
         return values
     for row, line in enumerate(lines, start=2):
@@ -135,8 +137,9 @@ def _check_row(line: str, cells: tuple[str, ...], path: Path, row: int) -> None:
             value = float(text)
         except ValueError:
             value = np.nan
-        if not np.isfinite(value) or (cell == HEADER[1] and value < 0.0):
+        if not abs(value) < _BELOW or (cell == HEADER[1] and value < 0.0):
             least = ", not below 0" if cell == HEADER[1] else ""
+            least += f", its size below {_BELOW:g}" if np.isfinite(value) and value >= 0.0 else ""
             raise InputError(
                 f"{path}, column '{cell}', row {row}: '{text.strip()[:40]}', expected a finite number{least}"
             )

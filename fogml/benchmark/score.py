@@ -14,6 +14,7 @@ import fogml
 from fogml.benchmark.answers import DriftAnswer, read_drift
 from fogml.benchmark.rounds import TRACKS, TrackFolder, check_kept, read_round
 from fogml.blind.folders import OUTCOME, case_files, check_sums
+from fogml.blind.run import check_answers_to
 from fogml.blind.score import marks_of
 from fogml.blind.scoring.answers import NAMED, read_answer
 from fogml.blind.scoring.by_reality import each_kept, mass_on_true, within_one
@@ -85,6 +86,7 @@ def _drift_marks(
         nothing = run_errors(MeanModel().fit(train), test)
         nothing = nothing.within(test.time - test.time[0] >= settling_s)
         for name in entries:
+            check_answers_to(folder.answers(name) / case, folder.cases / case)
             answer = read_drift(folder.answers(name) / case, len(test))
             found[name].append(_mark(case, told["group"], nothing, answer, told["averaging_s"]))
     return found
@@ -132,9 +134,14 @@ def _figures(marks: Sequence[DriftMark]) -> dict[str, Any]:
 
 
 def geometric_mean(values: Sequence[float]) -> Estimate:
-    """The geometric mean with the interval of the central limit theorem for the logarithms."""
+    """The geometric mean with the interval of the central limit theorem for the logarithms.
+
+    With a value of zero, as of an answer without any error, it is zero and has none.
+    """
     if not values:
         return NOTHING
+    if min(values) == 0.0:
+        return Estimate(0.0, None, None, len(values))
     found = mean(np.log(values))
     low, value, high = (None if v is None else float(np.exp(v)) for v in (found.low, found.value, found.high))
     return Estimate(value, low, high, found.n)

@@ -261,6 +261,12 @@ def _is_there(folder: BlindFolder, plan: Plan, seed: int, sample_s: float) -> bo
         raise InputError(
             f"{path}: is of the {held.reality} reality, not of the {plan.reality}; choose another folder"
         )
+    # A form that is not linear reaches the wanted d' to a hundredth.
+    strange = [
+        e.d_prime for e in held.effects if not any(0.99 * a <= e.d_prime <= 1.01 * b for a, b in plan.strata)
+    ]
+    if strange and held.mix == plan.mix:
+        raise InputError(f"{path}: has d' {strange[0]:.3g}, outside what is wanted; choose another folder")
     if held.mix != plan.mix:
         which = "the whole mix" if held.mix else "chosen kinds or strata of d'"
         raise InputError(f"{path}: was drawn from {which}, unlike what is wanted; choose another folder")

@@ -177,7 +177,7 @@ def _is_open(folder: BlindFolder, name: str) -> bool:
 def _leave_out(folder: BlindFolder, name: str) -> list[str]:
     from fogml.twin.registry import effects
 
-    truth = Truth.model_validate(read_json(folder.truth / f"{name}.json"))
+    truth = read_truth(folder.truth / f"{name}.json")
     relative = relatives_of(folder, truth)
     known = {e.id for e in truth.known}
     found = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import shutil
 import threading
@@ -197,10 +198,28 @@ def case_stamp(folder: Path) -> str:
     return sources_stamp(sorted(path for path in folder.iterdir() if path.is_file()))
 
 
+def check_answers_to(answer: Path, case: Path) -> None:
+    """Refuse an answer to other files than a case has by now.
+
+    Raises
+    ------
+    InputError
+        If its ``outcome.json`` says so; one that states none, as written by hand, is taken as it is.
+    """
+    path = answer / OUTCOME
+    told = read_json(path) if path.is_file() else {}
+    if _FILES in told and told[_FILES] != case_stamp(case):
+        raise InputError(f"{path}: answers other files than {case} holds by now; answer the case again")
+
+
 def count_samples(folder: Path) -> int:
     """Samples in all runs of a case: lines less one header each."""
     files = case_files(folder)
     return sum(_lines(path) - 1 for path in (*files.fit, *files.held_out))
+
+
+def _links(folder: str, names: list[str]) -> list[str]:
+    return [name for name in names if os.path.islink(os.path.join(folder, name))]
 
 
 def _lines(path: Path) -> int:
@@ -245,7 +264,8 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
         answer = worker.ask(
             {"case": name, "out": out.name, "seed": plan.seed, "options": plan.options}, plan.limit_s
         )
-        if answer["done"] and not (out / plan.answer).is_file():
+        written = out / plan.answer
+        if answer["done"] and (written.is_symlink() or not written.is_file()):
             answer |= {"done": False, "reason": "no answer", "message": f"no {plan.answer} was written"}
     except WorkerLost as lost:
         usable = False
@@ -256,7 +276,8 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
     method, samples = plan.name or plan.method, count_samples(case)
     values = outcome_of(name, method, answer, worker.locks, samples, shared.code, files)
     with folder_to_fill(plan.answers), whole_folder(plan.answers, shared=True) as staging:
-        shutil.copytree(out, staging / name)
+        # A link that a method leaves would have its keeper read what the method itself can't.
+        shutil.copytree(out, staging / name, ignore=_links)
         write_json(staging / name / OUTCOME, values, indent=1)
     shutil.rmtree(case)
     shutil.rmtree(out)

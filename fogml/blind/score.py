@@ -11,7 +11,7 @@ from typing import Any
 from fogml.blind.folders import SUMS, BlindFolder, check_sums
 from fogml.blind.plan import check_use
 from fogml.blind.relatives import relatives_of
-from fogml.blind.run import Progress
+from fogml.blind.run import Progress, check_answers_to
 from fogml.blind.scoring.answers import read_answer
 from fogml.blind.scoring.marks import Mark, mark
 from fogml.blind.scoring.marks_file import Marks, part_of
@@ -48,7 +48,7 @@ def gather(
     ------
     InputError
         If the truth changed since it was hashed, cases and truths don't match, there are no answers,
-        or a final seed is used without the ledger.
+        one is to other files than its case holds, or a final seed is used without the ledger.
     """
     names = folder.names()
     count = check_sums(folder.truth)
@@ -92,6 +92,8 @@ def marks_of(
 def _marks_of_case(folder: BlindFolder, methods: tuple[str, ...], truth: Truth) -> list[Mark]:
     # What is a relative does not depend on who names it: it is worked out once for all methods.
     relative = relatives_of(folder, truth)
+    for method in methods:
+        check_answers_to(folder.answers(method) / truth.case, folder.cases / truth.case)
     return [mark(truth, read_answer(folder.answers(m) / truth.case), relative) for m in methods]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,11 +11,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from fogml.benchmark.answers import answer_by, entry_name, read_drift, write_drift
+from fogml.benchmark.answers import answer_by, entry_name, entry_plan, read_drift, write_drift
 from fogml.benchmark.make import DriftCase, make_round, write_round
 from fogml.benchmark.rounds import RoundDesign, TrackFolder
 from fogml.benchmark.score import DriftMark, _told_unknown, drift_figures, geometric_mean, score_round
 from fogml.blind.folders import case_files
+from fogml.blind.run import run_cases
 from fogml.blind.scoring.answers import NAMED
 from fogml.cli.main import app
 from fogml.errors import InputError
@@ -118,6 +120,7 @@ def test_a_failed_case_counts_as_doing_nothing(made: Path) -> None:
         ("nan", r"column 'drift \[deg/h\]', row 3: 'nan', expected a finite number"),
         ("one", r"row 3: 'one', expected a finite number"),
         ("1,-2", r"column 'half_width \[deg/h\]', row 3: '-2', expected a finite number, not below 0"),
+        ("1e300", r"row 3: '1e300', expected a finite number, its size below 1e\+100"),
         ("1,2,3", r"row 3: 3 cells, expected"),
     ],
 )
@@ -148,8 +151,6 @@ def test_an_entry_that_lacks_a_case_or_rows_is_refused(made: Path) -> None:
 
 
 def test_an_answer_that_was_changed_after_it_was_bound_is_refused(made: Path, tmp_path: Path) -> None:
-    import shutil
-
     other = shutil.copytree(made, tmp_path / "other")
     path = other / "kept" / "drift" / "0001" / "held-out-1.csv"
     path.write_text(path.read_text() + "\n")
@@ -207,6 +208,20 @@ def test_names_and_means() -> None:
     assert entry_name("sklearn.svm.SVR") == "SVR" and entry_name("mine.one:gru") == "gru"
     found = geometric_mean([0.5, 2.0])
     assert found.value == pytest.approx(1.0) and found.n == 2
+    # Of answers one of which is the truth itself; each rms over nothing stays a number.
+    assert geometric_mean([0.0, 2.0]).value == 0.0
+
+
+def test_an_answer_to_a_case_that_is_another_one_by_now_is_not_scored(made: Path, tmp_path: Path) -> None:
+    home = shutil.copytree(made, tmp_path / "round")
+    drift = TrackFolder(home, "drift")
+    shutil.rmtree(home / "entries")
+    assert run_cases(entry_plan(home, "drift", "mean")) == (1, 0)
+    assert score_round(home, ["mean"])["drift"]["mean"]["figures"]["all"]["failed"] == 0
+    side = drift.cases / "0001" / "fit-1.yaml"
+    side.write_text(side.read_text() + "notes: another\n" if side.exists() else "notes: another\n")
+    with pytest.raises(InputError, match="answers other files than"):
+        score_round(home, ["mean"])
 
 
 @pytest.mark.parametrize(

@@ -183,3 +183,12 @@ def test_only_what_is_drawn_whole_is_of_the_mix(made: BlindFolder, tmp_path: Pat
     del old["mix"]
     (tmp_path / "0001.json").write_text(json.dumps(old))
     assert read_truth(tmp_path / "0001.json") == truth
+
+
+def test_a_suite_holds_one_range_of_d_prime(tmp_path: Path) -> None:
+    """Else the page of stronger cases held those of before, in silence."""
+    folder = tmp_path / "suite"
+    assert make_cases(folder, 1, 3, SAMPLE_S, 1, ["one"], d_prime=((10.0, 12.0),)) == 1
+    assert make_cases(folder, 1, 3, SAMPLE_S, 1, ["one"], d_prime=((10.0, 12.0),)) == 0
+    with pytest.raises(InputError, match="outside what is wanted"):
+        make_cases(folder, 1, 3, SAMPLE_S, 1, ["one"], d_prime=((20.0, 60.0),))

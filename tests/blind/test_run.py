@@ -14,7 +14,7 @@ import pytest
 import fogml
 from fogml.blind.folders import BlindFolder
 from fogml.blind.methods import code_state, load_method
-from fogml.blind.run import RunPlan, check_out_of_reach, run_cases
+from fogml.blind.run import RunPlan, check_answers_to, check_out_of_reach, run_cases
 from fogml.blind.worker import own_roots
 from fogml.cli.blind import RunSettings
 from fogml.cli.blind_job import run_and_tell
@@ -58,6 +58,12 @@ def peek(case, out):
     told["below"] = below_python(truth)
     told["own file"] = case.fit[0].read_text()[:4]
     (out / "gap.json").write_text(json.dumps(told))
+
+def links(case, out):
+    # To what the keeper could read, by a call below Python.
+    elsewhere = (Path(__file__).parent / "where.txt").read_text()
+    ctypes.CDLL(None).symlink(f"{elsewhere}/0001.json".encode(), str(out / "gap.json").encode())
+    ctypes.CDLL(None).symlink(elsewhere.encode(), str(out / "more").encode())
 
 def ends(case, out):
     if case.name == "0002":
@@ -104,6 +110,13 @@ def test_a_sealed_process_cannot_reach_the_truth(folder: BlindFolder, tmp_path: 
     if outcome(plan, "0001")["sealed_by"] == "landlock and audit":
         assert below < 0
     assert set(told.values()) == {"refused"}, told
+
+
+def test_a_keeper_follows_no_link_of_a_method(folder: BlindFolder, tmp_path: Path) -> None:
+    plan = RunPlan(folder, "cheat:links", name="links", code=tmp_path / "code", only=("0001",))
+    assert run_cases(plan) == (1, 1)
+    assert outcome(plan, "0001")["reason"] == "no answer"
+    assert [path.name for path in (plan.answers / "0001").iterdir()] == ["outcome.json"]
 
 
 def test_failures_are_recorded_and_the_rest_goes_on(folder: BlindFolder, tmp_path: Path) -> None:
@@ -160,7 +173,11 @@ def test_a_case_that_has_changed_is_answered_again(folder: BlindFolder, tmp_path
     side = folder.cases / "0006" / "fit-1.yml"
     side.write_text("latitude: 39.9\n")
     assert plan.left() == ("0006",)
+    check_answers_to(plan.answers / "0001", folder.cases / "0001")
+    with pytest.raises(InputError, match="answers other files than"):
+        check_answers_to(plan.answers / "0006", folder.cases / "0006")
     assert run_cases(plan) == (1, 0)
+    check_answers_to(plan.answers / "0006", folder.cases / "0006")
     assert plan.left() == ()
 
 
