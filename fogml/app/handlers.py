@@ -10,7 +10,6 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 from tornado.http1connection import HTTP1Connection
 from tornado.iostream import StreamClosedError
@@ -232,7 +231,7 @@ class _Upload(_Handler):
         if told > self.app.limits.upload_bytes:
             raise HTTPError(413, f"the file is larger than {self.app.limits.upload_bytes / 1e6:g} MB allowed")
         try:
-            self.app.files.place(unquote(self.path_args[0]))
+            self.app.files.place(self.path_args[0])
         except InputError as error:
             raise HTTPError(400, str(error)) from None
         self._file = tempfile.NamedTemporaryFile(  # noqa: SIM115
@@ -253,14 +252,14 @@ class _Upload(_Handler):
         assert self.partial is not None
         partial, self.partial = self.partial, None
         try:
-            self.app.files.keep(partial, unquote(name))
+            self.app.files.keep(partial, name)
         except InputError as error:
             raise HTTPError(409, str(error)) from None
         self.answer({})
 
     def delete(self, name: str) -> None:
         try:
-            self.app.files.remove(unquote(name))
+            self.app.files.remove(name)
         except InputError as error:
             raise HTTPError(404, str(error)) from None
         self.answer({})
@@ -285,7 +284,7 @@ class _Result(_Handler):
     async def get(self, name: str, path: str) -> None:
         home = (self.job_folder(name) / "results").resolve()
         try:
-            place = (home / unquote(path)).resolve()
+            place = (home / path).resolve()
             is_there = place.is_relative_to(home) and place.is_file()
         except (OSError, ValueError):  # no name that the system has
             is_there = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
+from urllib.parse import quote
 
 import pytest
 
@@ -137,6 +138,21 @@ def test_a_per_cent_sign_in_a_name_is_told_as_it_is(app):
         assert "'100%.csv'" in app.ask("PUT", "/api/files/100%25.csv", b"x")[1]
     finally:
         assert app.ask("DELETE", "/api/files/100%25.csv")[0] == 200
+
+
+@pytest.mark.parametrize("name", ["a%20b.csv", "100%41.csv", "a+b ü.csv"])
+def test_a_name_is_read_once(app, name):
+    """Else `100%41.csv` was kept as `100A.csv`, and a result of such a name was not found."""
+    address = quote(name, safe="")
+    assert app.ask("PUT", f"/api/files/{address}", b"x")[0] == 200
+    assert [p.name for p in (app.folder / "files").iterdir() if p.name != "kept.csv"] == [name]
+    assert app.ask("DELETE", f"/api/files/{address}")[0] == 200
+    results = app.folder / "jobs" / "0045" / "results"
+    results.mkdir(parents=True, exist_ok=True)
+    (results.parent / "job.json").write_text('{"words": ["docs"], "made": ""}')
+    (results.parent / "ended.json").write_text('{"status": 0, "seconds": 1.0}')
+    (results / name).write_text("held")
+    assert app.ask("GET", f"/results/0045/{address}")[:2] == (200, "held")
 
 
 def test_a_bad_form_is_one_line_and_no_job(app):
