@@ -9,9 +9,10 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
+from scipy.linalg import null_space
 
 from fogml.gap.card_form import Fitted, Form, Optimum, Root, optimum
-from fogml.gap.catalogue import nodes_of, signature_of
+from fogml.gap.catalogue import nodes_of, power_cycles, signature_of
 from fogml.gap.field import Field, Member, apart
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import LinearGaussian
@@ -225,22 +226,35 @@ def _step(runs: Sequence[Rows], amplitude: float, se: float) -> tuple[float, flo
 
 
 def _drawn(declared: Effect, told: Mapping[str, Any], field: Field, beside: LinearGaussian) -> Card:
-    """The spread over runs of an effect that each draws anew: a standard deviation, or a line's amplitude."""
+    """The spread over runs of an effect that each draws anew: a standard deviation, or a line's amplitude.
+
+    Constants of power cycles are told by what sets them apart: what is common to all is the bias.
+    """
     scene = field.setting.scene
     runs, shape = scene.fit, declared.default_shape(scene.grade)
     shape |= {name: float(told[name]) for name in shape if isinstance(told.get(name), float)}
+    cycles = declared.family == "power_cycles"
     own = []
     for rows in runs:
         if declared.family == "line":
             phase = 2.0 * np.pi * shape["frequency"] * rows.time_s
             own.append(np.column_stack([np.sin(phase), np.cos(phase)]))
+        elif cycles:
+            own.append(next(power_cycles(rows, scene, field.setting.values)).columns)
         else:
             own.append(rows.response(declared, shape, None, field.setting.values)[:, None])
     columns = field.whitening.stacked(apart(own, len(runs)))
+    count = free = len(runs)
+    if cycles:
+        columns = columns[:, columns.any(axis=0)]
+        count = columns.shape[1]
+        # Draws less their mean, of which there is one fewer.
+        free = max(count - 1, 1)
+        columns = columns @ null_space(np.ones((1, count)))
     inverse = np.linalg.pinv(beside.gram(columns), rcond=1e-6, hermitian=True)
-    each = (inverse @ beside.fits(columns)).reshape(len(runs), -1)
-    size = float(np.sqrt(np.mean(np.sum(each**2, axis=1))))
-    noise = float(np.sqrt(np.trace(inverse)) / len(runs))
-    se = math.hypot(noise, size / math.sqrt(2.0 * max(len(runs) - 1, 1)))
+    each = inverse @ beside.fits(columns)
+    size = math.sqrt(float(each @ each) / free)
+    noise = math.sqrt(float(np.trace(inverse)) / (free * max(len(each), 1)))
+    se = math.hypot(noise, size / math.sqrt(2.0 * max(count - 1, 1)))
     amplitude = float(np.clip(size, *declared.amplitude.limits))
     return Card(EffectValue(declared.id, amplitude, dict(shape)), se, {})

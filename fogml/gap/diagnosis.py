@@ -12,7 +12,7 @@ from fogml.gap.better_twin import counterfactuals
 from fogml.gap.causes import energy, found_cause
 from fogml.gap.compensation import compensation_of
 from fogml.gap.fitted_model import Explained, explained
-from fogml.gap.how_far import Foretold, HeldOut, cause_shares
+from fogml.gap.how_far import Foretold, HeldOut
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
 from fogml.gap.model import AnyModel, TwinModel
 from fogml.gap.own_simulator import candidates_of
@@ -30,6 +30,7 @@ from fogml.gap.reports import (
 from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.result_parts import Nearest, WhatIf
 from fogml.gap.settings import STANDARD, Priors
+from fogml.gap.shares import cause_shares
 from fogml.gap.where import GapOnRun, where
 from fogml.processes import one_thread
 from fogml.runs.names import named_apart

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,13 +14,12 @@ from fogml.gap.field import Member
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.noise import white_noise
-from fogml.gap.posterior import Cause, Judgement
-from fogml.gap.result_parts import CauseShare, HowFar
+from fogml.gap.posterior import Cause
+from fogml.gap.result_parts import HowFar
 from fogml.gap.rows import Rows
 from fogml.gap.where import averages
 from fogml.intervals import TAILS, Z90
 from fogml.numerals import listed, short
-from fogml.runs.regimes import Regimes
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect
@@ -78,12 +77,33 @@ class Foretold:
             total = total - rows.made(declared, had.amplitude, had.shape, self.found.setting.values)
         return total
 
+    def left_on(self, run: int) -> FloatArray:
+        """Recorded less what is foretold [deg/h], shape (m,); of a held-out run beside `anew`."""
+        return self._beside_anew(run, self.found.scene.runs[run].gap - self.on(run))
+
+    @property
+    def anew(self) -> list[str]:
+        """Titles of causes of which each power cycle has a constant of its own: no run tells another's."""
+        families, candidates = self.found.columns.families, self.found.scene.candidates
+        held = [candidates.get(families[m.family].id) for m in self.members]
+        drawn = (one.title for one in held if one is not None and one.family == "power_cycles")
+        return list(dict.fromkeys(drawn))
+
+    def _beside_anew(self, run: int, values: FloatArray) -> FloatArray:
+        """Values on a run, shape (m, ...), less the mean of each power cycle of a held-out one."""
+        if run < self.found.scene.fitted or not self.anew:
+            return values
+        rows = self.found.scene.runs[run]
+        cycle = rows.even.power_cycle[rows.kept]
+        means = {c: values[cycle == c].mean(axis=0) for c in np.unique(cycle).tolist()}
+        return np.asarray(values - np.array([means[c] for c in cycle.tolist()]))
+
     def drawn_on(self, run: int, rng: np.random.Generator) -> FloatArray:
         """Draws of what is foretold less what is [deg/h], shape (m, draws)."""
         slopes = [form.slopes_on(run, unknowns) for form, unknowns in self.forms.values()]
         drawn = self.drawn(rng)
         off = drawn[:, 1:] - drawn[:, :1]
-        return np.asarray(np.concatenate([self.design(run), *slopes], axis=1) @ off)
+        return self._beside_anew(run, np.concatenate([self.design(run), *slopes], axis=1) @ off)
 
     def of_cause(self, run: int, cause: Cause) -> FloatArray:
         """What one cause makes on a run [deg/h], with what the model has of it, shape (m,)."""
@@ -189,21 +209,28 @@ class HeldOut:
         uncertain floor.
         """
         windows, rec, floor = self._windows, self._recalibrated, self._floor
-        left = self.rows.gap - after.on(self.run)
+        left = after.left_on(self.run)
         aft = _square(windows.of(left))
         closed, interval, draws = None, None, self._settings.draws
         within = "at the floor within its noise"
         if rec > floor and self._anew:
             within = f"within noise and what is drawn anew on each run ({listed(self._anew)})"
-        note = f"the recalibrated twin is {within}: what is closed can't be told"
-        if not self._at_floor:
-            note = "" if aft <= rec else "the run is foretold worse with what was found than without"
+        said = [self._noisier] if self._noisier else []
+        if self._at_floor:
+            said.append(f"the recalibrated twin is {within}: what is closed can't be told")
+        else:
+            if after.anew:
+                said.append(f"beside a constant of the run's own ({listed(after.anew)})")
+            if aft > rec:
+                said.append("the run is foretold worse with what was found than without")
             gap = rec - floor
             closed = (rec - aft) / gap
             moved = np.zeros(draws)
             if after.members or after.forms:
                 if rec >= aft > self._loudest:
-                    note = "what is left is beyond noise; against the twin that is written more may be named"
+                    said.append(
+                        "what is left is beyond noise; against the twin that is written more may be named"
+                    )
                 drawn_left = left[:, None] - after.drawn_on(self.run, self._rng)
                 moved = np.array([_square(windows.of(column)) for column in drawn_left.T]) - aft
             room = np.maximum(aft - self._rng.choice(self._noises, (draws, draws)), 0.0)
@@ -211,8 +238,6 @@ class HeldOut:
             drawn = closing / np.maximum(rec - self._floors[None, :], self._settings.least_gap * gap)
             low, high = np.quantile(drawn, TAILS)
             interval = min(float(low), closed), max(float(high), closed)
-        if self._noisier:
-            note = f"{self._noisier}{'; ' if note else ''}{note}"
         return HowFar(
             run=self.rows.run.name,
             averaging_s=windows.window_s,
@@ -222,7 +247,7 @@ class HeldOut:
             floor=floor**0.5,
             closed=closed,
             closed_ci90=interval,
-            note=note,
+            note="; ".join(said),
         )
 
 
@@ -242,89 +267,3 @@ def _own_noise(rows: Rows, found: Inference, made: Sequence[FloatArray]) -> tupl
 
 def _square(values: FloatArray) -> float:
     return float(np.mean(values**2))
-
-
-def cause_shares(
-    found: Inference, judged: Judgement, every: Foretold, recalibrated: Foretold, seed: int
-) -> tuple[CauseShare, ...]:
-    """Shapley's shares of what the causes of the likeliest set take away on the fit runs: in all, by run, by
-    regime; intervals of 90 % from the posterior of coefficients.
-
-    A set S of causes takes the energy ``v(S) = sum r^2 - sum (r - sum_S c)^2`` away from a gap r. Shapley's
-    value of this game (L. S. Shapley, Ann. Math. Stud. 28 (1953) 307) has a closed form, since what two
-    causes do together is a product of the two, which they share alike::
-
-        value of i = sum over rows of c_i (2 r - sum_k c_k)
-
-    ``c`` are the causes' courses less what the constants would take up of each. Values add up to v of all
-    causes. Known causes are told apart; all others are ``unknown``.
-    """
-    scene, least = found.scene, found.setting.priors.reported.least_part
-    groups: dict[str, list[Member]] = {}
-    for m in judged.best.members:
-        id = found.columns.families[m.family].id if found.kind(m) == "known" else "unknown"
-        groups.setdefault(id, []).append(m)
-    if not groups:
-        return ()
-    rng = np.random.default_rng([seed, len(groups)])
-    courses = _group_courses(found, every, recalibrated, list(groups.values()), rng)
-    values = [
-        shapley_values(r.gap - recalibrated.on(i), c) for i, (r, c) in enumerate(zip(scene.fit, courses))
-    ]
-    by_run = [v.sum(axis=0) for v in values]
-    whole = np.sum(by_run, axis=0)
-    parts: list[tuple[str | None, str | None, FloatArray]] = []
-    if scene.fitted > 1:
-        parts += [(r.run.name, None, part) for r, part in zip(scene.fit, by_run)]
-    for index, name in enumerate(Regimes.names):
-        inside = [v[r.regime == index].sum(axis=0) for r, v in zip(scene.fit, values)]
-        parts.append((None, name, np.sum(inside, axis=0)))
-    shares = _told(groups, whole, None, None)
-    for run, regime, part in parts:
-        # Of a part with hardly anything of all that is taken away nothing can be told.
-        if part[:, 0].sum() > least * whole[:, 0].sum():
-            shares += _told(groups, part, run, regime)
-    return tuple(shares)
-
-
-def shapley_values(gap: FloatArray, courses: FloatArray) -> FloatArray:
-    """What each cause takes away of the energy of each row [(deg/h)^2], by Shapley.
-
-    A gap of shape (m,), courses of shape (m, causes, ...); the sum over rows is the cause's value.
-    """
-    left = gap.reshape(len(gap), *(1 for _ in courses.shape[1:]))
-    return np.asarray(courses * (2.0 * left - courses.sum(axis=1, keepdims=True)))
-
-
-def _group_courses(
-    found: Inference,
-    every: Foretold,
-    recalibrated: Foretold,
-    groups: Sequence[Sequence[Member]],
-    rng: np.random.Generator,
-) -> list[FloatArray]:
-    """What each group makes on each fit run beyond the constants: the mean first, then draws.
-
-    Shape (m, groups, 1 + draws) for each run.
-    """
-    scene, held = found.scene, found.field
-    drawn = every.drawn(rng)
-    parts = [
-        np.stack([np.sum([every.part(i, m, drawn) for m in group], axis=0) for group in groups], axis=1)
-        for i in range(scene.fitted)
-    ]
-    flat = held.whitening.stacked([p.reshape(len(p), -1) for p in parts])
-    taken = recalibrated.posterior.covariance @ (held.fixed.T @ flat)
-    return [p - (found.setting.fixed[i] @ taken).reshape(p.shape) for i, p in enumerate(parts)]
-
-
-def _told(groups: Iterable[str], values: FloatArray, run: str | None, regime: str | None) -> list[CauseShare]:
-    """Shares of values of shape (groups, 1 + draws)."""
-    total = values.sum(axis=0)
-    shares = values / np.where(np.abs(total) > 0.0, total, np.inf)
-    low, high = np.quantile(shares[:, 1:], TAILS, axis=1)
-    rows = zip(groups, shares[:, 0], low, high)
-    return [
-        CauseShare(name, run, regime, float(s), (float(min(a, s)), float(max(b, s))))
-        for name, s, a, b in rows
-    ]

@@ -113,7 +113,7 @@ def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tupl
         windows = averages(rows, found.setting.priors.reported.averaging_s)
         temperature = windows.of(rows.temperature)
         recorded, gap_before = windows.of(rows.recorded), windows.of(rows.gap)
-        gap_recalibrated, gap_after = (windows.of(rows.gap - told.on(i)) for told in (recalibrated, after))
+        gap_recalibrated, gap_after = (windows.of(told.left_on(i)) for told in (recalibrated, after))
         out.append(
             RunSeries(
                 run=rows.run.name,

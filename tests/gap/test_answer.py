@@ -56,6 +56,19 @@ def test_the_same_twin_with_its_own_sensors_leaves_no_gap(tactical, runs):
     assert max(errors) < 3.0
 
 
+def test_turn_on_bias_closes_beside_a_constant_of_the_held_out_run(tactical):
+    twin = replace(tactical.without_effect("turn_on_bias"), noise=replace(tactical.noise, B=0.0, K=0.0))
+    made = [_run(twin, seed, sample_s=120.0) for seed in range(5)]
+    runs = [r.with_columns(gyro=r.gyro_deg_h + b) for r, b in zip(made, (0.5, -0.4, 0.9, 0.1, -0.8))]
+    found = diagnose(TwinModel(twin), runs[:4], runs[4:], plan=False)
+    assert [f.effect for f in found.named] == ["turn_on_bias"]
+    far, series = found.how_far[0], found.series[-1]
+    # No run tells the constant of another one: the rest is at the noise about its own mean.
+    assert far.after == pytest.approx(np.std(series.gap_recalibrated), rel=0.05)
+    assert np.mean(series.gap_after) == pytest.approx(0.0, abs=0.01) and far.closed > 0.95
+    assert "constant of the run's own" in found.headline[-1]
+
+
 def test_a_run_of_another_turn_on_bias_is_within_what_the_twin_draws(tactical):
     bare = tactical.without_effect("turn_on_bias")
     made = [_run(bare, seed) for seed in (1, 2, 3)]

@@ -94,3 +94,19 @@ def test_a_direction_that_does_not_matter_leaves_a_size_alone():
     assert card.value.amplitude == pytest.approx(0.3, rel=1e-3)
     alone = field.base.length(made) ** -1.0
     assert card.amplitude_se == pytest.approx(0.3 * np.hypot(alone, STANDARD.form_error), rel=0.02)
+
+
+@pytest.mark.parametrize("common", [0.0, 4.0])
+def test_turn_on_bias_is_the_deviation_of_constants_whatever_is_common_to_them(common):
+    time, sizes = 60.0 * np.arange(400), common + np.array([0.1, -0.2, 0.4, 0.05])
+    runs = [
+        Run.from_columns(f"r{i}", time=time, gyro=np.zeros(400), T=25.0 + 30.0 * np.sin(time / 3000.0 + i))
+        for i in range(len(sizes))
+    ]
+    held = foreseen(TwinModel(load_twin("nominal")), runs, NoiseModel(0.002, 0.0, 0.0), STANDARD).field
+    gaps = [np.full(len(r), size) for r, size in zip(held.setting.scene.fit, sizes)]
+    beside = replace(held.base, data=held.whitening.stacked(gaps))
+    card = card_of("turn_on_bias", held, beside, {})
+    assert card.value.amplitude == pytest.approx(sizes.std(ddof=1), rel=1e-3)
+    # Of so few the deviation is known by the chi distribution.
+    assert card.amplitude_se == pytest.approx(sizes.std(ddof=1) / np.sqrt(2.0 * 3.0), rel=0.01)

@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from fogml.gap.how_far import shapley_values
+from fogml.gap.shares import shapley_values
 
 
 def test_values_are_what_each_cause_adds_on_average_over_all_orders():
