@@ -84,6 +84,33 @@ def test_information_is_that_of_the_replay_and_the_dense_covariance(rehearsed):
     assert np.linalg.eigvalsh(left / np.outer(size, size)).min() > -1e-9
 
 
+@pytest.mark.parametrize(
+    ("id", "size", "shape", "moved"),
+    [
+        ("deadband", 0.5, {}, "amplitude"),
+        ("warmup_bias", 2.0, {"fast_time_constant": 0.1}, "fast_time_constant"),
+        ("warmup_bias", 2.0, {"slow_time_constant": 50.0}, "slow_time_constant"),
+    ],
+)
+def test_responses_are_slopes_at_what_the_twin_states(id, size, shape, moved):
+    """Of a dead zone about its own size; of a shape at or near the least that there is."""
+    on = stage(TWIN.with_effect(id, size, **shape), NOISE, VALUES, facts=FACTS)
+    rehearsal = Rehearsal(on, Family(), replace(SHORT, ladder="slow rates", cold_start=True), 30.0)
+    of = unknowns(on, [f"{id}.{moved}"])
+    (place,) = of.wanted
+    step = 0.01 * of.parameters[place].scale
+    replayer, made = Replayer(rehearsal.rows.run), []
+    for end in (max(of.parameters[place].value - step, 0.1), of.parameters[place].value + step):
+        values = {"amplitude": size, **shape, moved: end}
+        twin = TWIN.with_effect(id, values.pop("amplitude"), **values)
+        made.append((end, rehearsal._whiten(replayer.output(twin)[rehearsal.rows.kept][:, None])[:, 0]))
+    (low, below), (high, above) = made
+    slope = of.parameters[place].scale * (above - below) / (high - low)
+    found = responses(rehearsal, of)[:, place]
+    assert found == pytest.approx(slope, abs=1e-6 * max(np.abs(slope).max(), 1.0))
+    assert np.isfinite(expected(rehearsal, of)).all()
+
+
 def test_merits_are_those_of_the_covariance(rehearsed):
     on, rehearsal = rehearsed
     of = unknowns(on, ["k1", "b1"])

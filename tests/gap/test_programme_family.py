@@ -33,9 +33,10 @@ designs = st.builds(
 
 
 @settings(max_examples=60, deadline=None)
-@given(designs)
-def test_a_design_reads_back_as_the_same_programme(design):
-    family = Family(hours=1000.0)
+@given(designs, st.floats(-80.0, 20.0), st.floats(30.0, 100.0))
+def test_a_design_reads_back_as_the_same_programme(design, coldest, hottest):
+    """Within the chamber's limits, which need not be whole degrees."""
+    family = Family(hours=1000.0, limits=(coldest, hottest))
     programme = family.programme(design)
     read = programme_from(yaml.safe_load(programme.as_yaml()))
     assert read.steps == programme.steps and read.powered == programme.powered

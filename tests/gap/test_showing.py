@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
 
+from fogml.gap.model import EffectValue
 from fogml.gap.planning.fisher import usual_value
 from fogml.gap.planning.programme_design import Design
 from fogml.gap.planning.programme_family import Family
@@ -15,6 +18,8 @@ from fogml.gap.planning.showing import lengths, showing_run
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.programme import load_programme
+from fogml.twin.replay import Replayer
+from fogml.twin.set_up import Sensors
 from fogml.twin.twin_file import load_twin
 
 TWIN = load_twin("nominal")
@@ -29,6 +34,23 @@ def test_lengths_are_those_of_a_search_for_separating_runs():
     values = [usual_value(on, id) for id in ("thermal_hysteresis", "sf_asymmetry")]
     wanted = [distances(rehearsal, members_of(on, family, [value]))[0, 0] for value in values]
     np.testing.assert_allclose(lengths(rehearsal, values), wanted, rtol=1e-6)
+
+
+def test_the_length_of_a_dead_zone_is_that_at_its_own_size():
+    facts = FACTS.model_copy(update={"input_axis": "east"})
+    plain = replace(TWIN.with_nominal(**dict.fromkeys(CONSTANTS, 0.0)), sensors=Sensors())
+    on, family = stage(plain, NOISE, dict.fromkeys(CONSTANTS, 0.0), facts=facts), Family()
+    rehearsal = Rehearsal(on, family, Design(mounting=None, ladder="slow rates"))
+    for size in (0.02, 0.5):
+        replayer = Replayer(rehearsal.rows.run)
+        made = replayer.output(plain.with_effect("deadband", size)) - replayer.output(plain)
+        white = rehearsal._whiten(made[rehearsal.rows.kept][:, None])
+        expected = np.sqrt(rehearsal.beside(white)[0, 0])
+        value = EffectValue("deadband", size)
+        assert lengths(rehearsal, [value])[0] == pytest.approx(expected, rel=1e-6)
+        assert distances(rehearsal, members_of(on, family, [value]))[0, 0] == pytest.approx(
+            expected, rel=1e-6
+        )
 
 
 def test_what_needs_turns_or_a_changed_temperature_gets_them():

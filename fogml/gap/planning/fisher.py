@@ -10,7 +10,7 @@ the catalogue spreads them is promised.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,13 +21,15 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.model import EffectValue
 from fogml.gap.planning.rehearsal import ExpectedRuns, Stage
+from fogml.gap.rows import at_amplitude
 from fogml.intervals import Z90
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.quantities import Grade, Quantity
 from fogml.twin.registry import effect
 
 Criterion = Literal["D", "A"]
-_SHAPE_STEP = 0.01
+_STEP = 0.01
+"""Of an unknown's scale, for slopes."""
 _FLAT = 1e-12
 """Precision of an amplitude's prior in usual sizes: it may be anything."""
 _SHAPES = 16
@@ -162,11 +164,26 @@ def responses(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
     scales = {p.name: p.scale for p in of.parameters}
     blocks = [rehearsal.constants]
     for value in of.effects:
-        columns = rehearsal.white(value.id, _moved(value, scales))
-        blocks.append(columns[:, :1] * scales[f"{value.id}.amplitude"])
-        ups, downs = columns[:, 1::2], columns[:, 2::2]
-        blocks.append(value.amplitude * (ups - downs) / (2.0 * _SHAPE_STEP))
+        declared, size = effect(value.id), value.amplitude
+        scale = scales[f"{value.id}.amplitude"]
+        if declared.in_proportion or size == 0.0:
+            blocks.append(scale * rehearsal.white(value.id, [value.shape]))
+        else:
+            ends = _ends(size, scale, declared.amplitude.limits)
+            shapes = [at_amplitude(declared, end, value.shape) for end in ends.tolist()]
+            blocks.append(scale * np.diff(ends * rehearsal.white(value.id, shapes)) / np.ptp(ends))
+        for quantity in declared.shape:
+            scale = scales[f"{value.id}.{quantity.name}"]
+            ends = _ends(value.shape[quantity.name], scale, quantity.limits)
+            moved = ({**value.shape, quantity.name: end} for end in ends.tolist())
+            shapes = [at_amplitude(declared, size, shape) for shape in moved]
+            blocks.append(size * scale * np.diff(rehearsal.white(value.id, shapes)) / np.ptp(ends))
     return np.concatenate(blocks, axis=1)
+
+
+def _ends(value: float, scale: float, limits: tuple[float, float]) -> FloatArray:
+    """A step below a value and one above, within what is physical, shape (2,)."""
+    return np.clip(value + _STEP * scale * np.array([-1.0, 1.0]), *limits)
 
 
 def information(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
@@ -204,9 +221,7 @@ def expected(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
         true, pull = dict(held), np.zeros_like(planned)
         for (key, value), i, z in zip(held.items(), rows, deviates, strict=True):
             factor, sd, (low, high) = spreads[key]
-            # Where a step either way is possible too.
-            step = _SHAPE_STEP * of.parameters[i].scale
-            true[key] = float(np.clip(value * math.exp(factor * z) + sd * z, low + step, high - step))
+            true[key] = float(np.clip(value * math.exp(factor * z) + sd * z, low, high))
             if factor:
                 # Of a normal one the mean square off the plan is the prior's, and nothing is left.
                 off = (true[key] - value) / of.parameters[i].scale
@@ -251,15 +266,6 @@ def merit(info: FloatArray, wanted: Sequence[int], criterion: Criterion) -> floa
     if criterion == "A":
         return -0.5 * math.log(float(np.trace(block)) / len(block))
     return -0.5 * float(np.linalg.slogdet(block)[1]) / len(block)
-
-
-def _moved(value: EffectValue, scales: Mapping[str, float]) -> list[Mapping[str, float]]:
-    """The shape, and for each of its parameters one a step above and one a step below."""
-    shapes: list[Mapping[str, float]] = [value.shape]
-    for name, number in value.shape.items():
-        step = _SHAPE_STEP * scales[f"{value.id}.{name}"]
-        shapes += [{**value.shape, name: number + step}, {**value.shape, name: number - step}]
-    return shapes
 
 
 def _shape_sd(quantity: Quantity, low: float, high: float) -> float:

@@ -7,6 +7,7 @@ soaks, a minor loop, turns of the table, power steps. `Family.programme` writes 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -146,11 +147,11 @@ class Family:
         return design
 
     def temperatures(self, design: Design) -> tuple[float, float]:
-        """Lowest and highest temperature of the cycles [degC], in whole degrees."""
+        """Lowest and highest temperature of the cycles [degC], in whole degrees within the limits."""
         low, high = self.limits
         return (
-            float(round(ROOM_DEGC + design.cold_share * (low - ROOM_DEGC))),
-            float(round(ROOM_DEGC + design.hot_share * (high - ROOM_DEGC))),
+            float(max(round(ROOM_DEGC + design.cold_share * (low - ROOM_DEGC)), math.ceil(low))),
+            float(min(round(ROOM_DEGC + design.hot_share * (high - ROOM_DEGC)), math.floor(high))),
         )
 
     def programme(self, design: Design, name: str = "planned") -> Programme:

@@ -27,6 +27,7 @@ from fogml.gap.planning.programme_family import Family
 from fogml.gap.planning.programme_search import MOST_RUNS, Tried, finely, search
 from fogml.gap.planning.rehearsal import FINE_S, ExpectedRuns, Rehearsal, Stage, stage
 from fogml.gap.result import SeparatingRun
+from fogml.gap.rows import at_amplitude
 from fogml.gap.shapes import GridNode, grid
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
@@ -176,7 +177,8 @@ def members_of(on: Stage, family: Family, members: Sequence[EffectValue]) -> tup
         if value.amplitude == 0.0:
             raise InputError(f"effect '{value.id}' has a size of 0; give the size that is to be told")
         usual = candidate.default_shape(on.model.grade)
-        shape = usual | {name: number for name, number in value.shape.items() if name in usual}
+        own_shape = usual | {name: number for name, number in value.shape.items() if name in usual}
+        shape = at_amplitude(candidate, value.amplitude, own_shape)
         nodes = grid(candidate, on.model.grade, partial(rehearsal.response, value.id), spans)
         kept = [nodes[i] for i in _thinned(len(nodes))]
         own = GridNode(shape, (shape,))

@@ -16,6 +16,7 @@ from fogml.gap.planning.programme_search import finely, search
 from fogml.gap.planning.rehearsal import COARSE_S, FINE_S, Rehearsal, stage
 from fogml.gap.planning.separating import LEAST_DISTANCE, run_of
 from fogml.gap.result import SeparatingRun
+from fogml.gap.rows import at_amplitude
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect, NoiseEffect
@@ -88,5 +89,7 @@ def _may_show(declared: Effect) -> bool:
 
 def lengths(rehearsal: Rehearsal, values: Sequence[EffectValue]) -> FloatArray:
     """Whitened length of each effect beside the constants, shape (k,)."""
-    columns = np.concatenate([v.amplitude * rehearsal.white(v.id, [v.shape]) for v in values], axis=1)
+    shapes = [at_amplitude(effect(v.id), v.amplitude, v.shape) for v in values]
+    made = [v.amplitude * rehearsal.white(v.id, [shape]) for v, shape in zip(values, shapes)]
+    columns = np.concatenate(made, axis=1)
     return np.asarray(np.sqrt(np.maximum(np.diagonal(rehearsal.beside(columns)), 0.0)))
