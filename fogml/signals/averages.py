@@ -129,12 +129,13 @@ def _windows(time: FloatArray, window_s: float) -> tuple[IndexArray, IndexArray]
 def window_means(values: FloatArray, starts: IndexArray, stops: IndexArray) -> FloatArray:
     """Means of the samples ``starts[i]:stops[i]`` of values of shape (n,) or (n, k); no window is empty.
 
-    Windows follow each other and don't overlap; samples between them are left out.
+    Windows follow each other and don't overlap; samples between them are left out. What is not finite is in
+    its own window alone.
     """
     if len(starts) == 0:
         return np.empty((0, *values.shape[1:]))
     # Without its first value, a time or a rate far from zero loses no digits in the sums.
-    origin = values[starts[0]]
+    origin = np.nan_to_num(values[starts[0]], posinf=0.0, neginf=0.0)
     # reduceat sums between neighbouring edges, so dropped windows are summed and left out.
     edges = np.unique(np.concatenate((starts, stops, [len(values)])))
     sums = np.empty((len(edges) - 1, *values.shape[1:]))
@@ -200,7 +201,7 @@ def with_whole_turns(turned_deg: FloatArray, told_deg: FloatArray) -> FloatArray
 
 def _sine_ratio(x: FloatArray) -> FloatArray:
     """sin(x) / x, shape (n,), exact to rounding."""
-    if max(float(x.max(initial=0.0)), -float(x.min(initial=0.0))) > _SMALL:
+    if not max(float(x.max(initial=0.0)), -float(x.min(initial=0.0))) <= _SMALL:
         return np.sinc(x / np.pi)
     # Slow motion, the usual case, needs no sine.
     square = x * x
@@ -277,7 +278,9 @@ def averages_variance(
     cycles = np.geomspace(lowest, highest, int(64 * np.log2(highest / lowest)) + 1)
     density = term_shapes(cycles / sample_s, sample_s, SpectrumTerms((name,)))[..., 0]
     response = averages_response(cycles, m, windows)
-    return float(np.trapezoid(density * response * cycles / sample_s, np.log(cycles)))
+    each = density * response * cycles / sample_s
+    # Below the grid a random walk's is even in frequency, and that of the others next to nothing.
+    return float(np.trapezoid(each, np.log(cycles)) + each[0])
 
 
 def averages_response(cycles: FloatArray, m: float, windows: int) -> FloatArray:

@@ -23,6 +23,10 @@ _WORTH = 2.0
 """Nats that a filter must bring before all forms are tried."""
 _ENDS = 0.01
 """Share of a row's density that its series' ends may make."""
+_TIME_TOLD = 0.01
+"""Share to which a correlation time is found."""
+_TIMES = np.linspace(-2.0, 2.0, 5)
+"""Correlation times beside the likeliest, in their standard errors."""
 _LIVE = 5.0
 """Nats of evidence below the best at which a model no longer counts."""
 
@@ -94,7 +98,7 @@ def search_noise(
 
     White noise, flicker, random walk and quantisation alone; behind low passes of first and second order
     and a running mean; and, where none of those fits, from each octave on down, the rows above being left to
-    themselves. A Gauss-Markov term competes beside the best of them.
+    themselves. A Gauss-Markov term competes beside the terms alone and beside the best of them.
 
     Parameters
     ----------
@@ -116,7 +120,10 @@ def search_noise(
         if fit_p_value(best.model, best.fit) < misfit_level:
             found += _from_lower_on(spectrum)
     if correlated:
-        found += _correlated(spectrum, max(found, key=lambda c: c.evidence), size)
+        # Beside the terms alone too: of what is correlated a filter may have been made.
+        best = max(found, key=lambda c: c.evidence)
+        for beside in (found[0], best) if best is not found[0] else (best,):
+            found += _correlated(spectrum, beside, size)
     found.sort(key=lambda c: -c.evidence)
     live = [c for c in found if c.evidence > found[0].evidence - _LIVE]
     weights = np.exp([c.evidence - live[0].evidence for c in live])
@@ -256,7 +263,13 @@ def _from_lower_on(spectrum: Spectrum) -> list[NoiseChoice]:
 
 
 def _correlated(spectrum: Spectrum, best: NoiseChoice, size: float, times: int = 10) -> list[NoiseChoice]:
-    """Models with a Gauss-Markov term, where slow noise is there at all."""
+    """Models with a Gauss-Markov term, where slow noise is there at all.
+
+    Its correlation time is the likeliest, and some within its error about it, together as likely as that one:
+    so intervals of the other terms count that it is not known.
+    """
+    from scipy.optimize import minimize_scalar
+
     fit = best.fit
     slow = fit["B"] + fit["K"]
     if slow == 0.0 and fit_p_value(best.model, fit) > 0.05:
@@ -265,15 +278,42 @@ def _correlated(spectrum: Spectrum, best: NoiseChoice, size: float, times: int =
     longest, shortest = 1.0 / (4.0 * np.pi * lowest), 2.0 * spectrum.sample_s
     if longest <= 2.0 * shortest:
         return []
-    found: list[NoiseChoice] = []
-    for tau in np.geomspace(shortest, longest, times):
-        terms = SpectrumTerms((*fit.terms.names, "G"), float(tau))
+    known: dict[float, NoiseChoice] = {}
+
+    def loss(log_time: float) -> float:
+        tau = float(np.exp(log_time))
+        terms = SpectrumTerms((*fit.terms.names, "G"), tau)
         model = SpectrumModel(spectrum, terms, fit.filter, best.model.used)
         start = replace(fit, terms=terms, coefficients=np.append(fit.coefficients, 1e-6 * fit["N"] / tau))
-        fitted = model.fit(start)
-        # What is more than white noise at the upper end too is white noise behind a filter of first order.
-        top = int(np.flatnonzero(model.used)[-1])
-        ahead = model.design(fitted.log_corner)[0][top] * fitted.coefficients
-        if ahead[-1] < ahead[terms.names.index("N")]:
-            found.append(NoiseChoice(model, fitted, best.penalty + size))
-    return sorted(found, key=lambda c: c.fit.loss)[:1]
+        known[log_time] = NoiseChoice(model, model.fit(start), best.penalty + size)
+        return known[log_time].fit.loss
+
+    low, high = np.log([shortest, longest])
+    grid = np.linspace(low, high, times)
+    step = float(grid[1] - grid[0])
+    first = grid[np.argmin([loss(at) for at in grid])]
+    bounds = max(first - step, low), min(first + step, high)
+    middle = float(minimize_scalar(loss, bounds=bounds, method="bounded", options={"xatol": _TIME_TOLD}).x)
+    near = 0.1 * step
+    bend = (loss(middle - near) - 2.0 * loss(middle) + loss(middle + near)) / near**2
+    error = min(1.0 / np.sqrt(max(bend, 1e-6)), 0.5 * step)
+    places = np.clip(middle + error * _TIMES, low, high)
+    for at in places:
+        loss(at)
+    found = [known[at] for at in np.unique(places) if _is_correlated(known[at])]
+    if not found:
+        return []
+    shares = np.array([choice.evidence for choice in found])
+    shared = float(np.logaddexp.reduce(shares) - shares.max())
+    return [replace(choice, penalty=choice.penalty + shared) for choice in found]
+
+
+def _is_correlated(choice: NoiseChoice) -> bool:
+    """Whether what is correlated is less than white noise at the upper end.
+
+    What is more there too is white noise behind a filter of first order.
+    """
+    model, fit = choice.model, choice.fit
+    top = int(np.flatnonzero(model.used)[-1])
+    ahead = model.design(fit.log_corner)[0][top] * fit.coefficients
+    return bool(ahead[-1] < ahead[fit.terms.names.index("N")])

@@ -259,5 +259,7 @@ def _allan_variance(
         # Where the grid no longer follows the fourth power, its mean does.
         power = np.where(m * cycles < 8.0, np.sin(np.pi * m * cycles) ** 4, 0.375)
         response = 2.0 * power / (m * np.sin(np.pi * cycles)) ** 2
-        variance[place] = np.trapezoid(density * response * cycles / sample_s, np.log(cycles))
+        each = density * response * cycles / sample_s
+        # Below the grid a random walk's is even in frequency, and that of the others next to nothing.
+        variance[place] = np.trapezoid(each, np.log(cycles)) + each[0]
     return variance

@@ -34,7 +34,7 @@ def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: SpectrumTerms)
     """Sampled one-sided density of each term of coefficient 1, shape of frequencies and (terms,).
 
     Samples are means over the sample interval, as a gyro's are: what lies above half the sampling rate
-    folds back, ``sum_j S(f + j/T) sinc^2`` in closed form (Hurwitz' zeta function).
+    folds back, ``sum_j S(f + j/T) sinc^2`` in closed form (Hurwitz' zeta function). A drift, D, is smooth.
     """
     from scipy.special import zeta
 
@@ -56,9 +56,21 @@ def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: SpectrumTerms)
         elif name == "E":
             columns.append((np.pi**2 * sine) ** -2.0)
         else:
-            tau = float(terms.correlation_s or 0.0)
-            columns.append(4.0 * tau / (1.0 + (2.0 * np.pi * frequency_hz * tau) ** 2))
+            columns.append(_gauss_markov(np.pi**2 * sine, sample_s, float(terms.correlation_s or 0.0)))
     return np.stack(columns, axis=-1)
+
+
+def _gauss_markov(square: FloatArray, sample_s: float, correlation_s: float) -> FloatArray:
+    """Density of means of a Gauss-Markov process of variance 1, `square` being sin^2(pi f T).
+
+    The Fourier sum of their covariances, ``2 phi_2(d)`` and ``phi_1(d)**2 exp(-d (k - 1))``, d = T/tau.
+    """
+    d = sample_s / correlation_s
+    # sinh(d)/d - 1, whose closed form cancels for slow ones.
+    series = d**2 / 6.0 * (1.0 + d**2 / 20.0 * (1.0 + d**2 / 42.0))
+    beyond = series if d < 0.1 else np.sinh(d) / d - 1.0
+    half = np.sinh(0.5 * d) ** 2
+    return np.asarray(4.0 * correlation_s * (half - square * beyond) / (half + square))
 
 
 # How a digital or an analogue filter sees a frequency, in cycles per sample.

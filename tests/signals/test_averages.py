@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
-from fogml.signals.averages import block_averages
+from fogml.signals.averages import block_averages, mean_cosine
 
 
 def plain(time: np.ndarray, values: np.ndarray, window_s: float) -> tuple[list[float], list[int]]:
@@ -108,3 +108,21 @@ def test_empty_single_and_bad_input():
         block_averages([0.0, 1.0], [1.0, 2.0], window_s=0.0)
     with pytest.raises(InputError, match="column 2 has 1 samples"):
         block_averages([0.0, 1.0], [1.0, 2.0], [1.0], window_s=1.0)
+
+
+@pytest.mark.parametrize("row", [0, 5])
+@pytest.mark.parametrize("missing", [np.nan, np.inf])
+def test_a_value_that_is_missing_is_in_its_own_window_alone(row: int, missing: float):
+    values = np.arange(10.0)
+    values[row] = missing
+    (means,) = block_averages(np.arange(10.0), values, window_s=2.0).values
+    expected = np.array([0.5, 2.5, 4.5, 6.5, 8.5])
+    expected[row // 2] = missing
+    np.testing.assert_allclose(means, expected)
+
+
+def test_an_angle_that_is_missing_leaves_the_others():
+    before, after = np.array([0.0, 1.0, np.nan]), np.array([3.0, 5.0, 6.0])
+    np.testing.assert_allclose(
+        mean_cosine(before, after), (np.sin(after) - np.sin(before)) / (after - before)
+    )

@@ -127,6 +127,26 @@ def test_flicker_counts_and_drift_does_not():
     assert floor_square(NoiseModel(0.3 / 60.0, 0.2), time, 100.0) == pytest.approx(want**2, rel=1e-6)
 
 
+@pytest.mark.parametrize("windows", [2, 60])
+@pytest.mark.parametrize("name", ["N", "B", "K", "Q"])
+def test_each_term_in_averages_is_that_of_their_covariance(name: str, windows: int):
+    place, each = np.arange(windows), 100.0
+    lag = np.abs(np.subtract.outer(place, place)).astype(float)
+
+    def flicker(x):
+        return np.where(x > 0.0, x**2 * np.log(np.maximum(x, 1.0)), 0.0)
+
+    covariance = {
+        "N": (lag == 0.0) / each,
+        # Second differences of the angle's, but for what is constant over all windows.
+        "B": (2.0 * flicker(lag) - flicker(lag + 1.0) - flicker(np.abs(lag - 1.0))) / (2.0 * np.pi),
+        "K": each * (np.minimum.outer(place, place) + np.where(lag == 0.0, 1.0 / 3.0, 0.5)),
+        "Q": (2.0 * (lag == 0.0) - (lag == 1.0)) / each**2,
+    }[name]
+    want = np.trace(covariance) / windows - covariance.mean()
+    assert averages_variance(name, 1.0, each, windows) == pytest.approx(want, rel=6e-3)
+
+
 def test_flicker_that_a_run_hardly_tells_is_in_the_interval():
     want, held = expected(24, 1.2, 0.05, 300.0), 0
     for seed in range(12):

@@ -9,6 +9,7 @@ from fogml.errors import InputError
 from fogml.signals.allan import AllanResult, allan_deviation
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 from fogml.signals.noise_terms import TERM_NAMES, NoiseTerms, noise_terms, noise_terms_of
+from fogml.signals.random_noise import gauss_markov
 
 SAMPLE_S = 0.1
 HOUR = 3600.0
@@ -175,6 +176,19 @@ def test_ramps_of_many_runs_are_not_their_errors(ramp: float):
         told = noise_terms(spectrum_of(parts, 1.0, lines), allan, ramps=runs).terms["R"]
         hits.append(told.lower <= HOUR * ramp <= told.upper and (told.value is None) == (ramp == 0.0))
     assert all(hits)
+
+
+def test_noise_beside_a_process_of_any_correlation_time_is_told():
+    """Whose correlation is exponential: no filter is made of it, nor is its time one of a few."""
+    for seed, tau in enumerate((3.0, 6.0, 20.0, 45.0)):
+        rng = np.random.default_rng(seed)
+        rate = rng.normal(size=40_000) + gauss_markov(rng, 40_000, 1.0, 1.0, tau)
+        told = noise_terms_of(rate, 1.0)
+        best, white = told.search.best, told.terms["N"]
+        assert best.filter.kind == "none"
+        assert (best.terms.correlation_s, best["G"]) == pytest.approx((tau, 1.0), rel=0.15)
+        assert white.lower < 1.0 / 60 < white.upper < 1.05 / 60
+        assert white.lower > 0.85 / 60
 
 
 def test_a_sinusoid_is_told_apart_and_noise_of_another_kind_widens_the_intervals():

@@ -22,10 +22,15 @@ def test_half_the_power_passes_at_the_corner(low_pass: OutputFilter) -> None:
     assert slope[0] == pytest.approx((more - less) / 2e-5, rel=1e-6)
 
 
-def test_what_is_correlated_has_half_its_density_at_its_corner() -> None:
-    corner = 1.0 / (2.0 * np.pi * 50.0)
-    (low,), (half,) = term_shapes(np.array([1e-9, corner]), 1.0, SpectrumTerms(("G",), correlation_s=50.0))
-    assert low == pytest.approx(4.0 * 50.0) and half == pytest.approx(0.5 * low)
+@pytest.mark.parametrize("sample_s", [0.01, 1.0])
+@pytest.mark.parametrize("samples", [0.5, 3.0, 50.0, 1e5])
+def test_what_is_correlated_is_the_sum_of_what_folds_back(sample_s: float, samples: float) -> None:
+    tau = samples * sample_s
+    cycles = np.array([1e-6, 1e-3, 0.03, 0.2, 0.5])
+    folds = cycles + np.arange(-2000, 2001)[:, None]
+    density = 4.0 * tau / (1.0 + (2.0 * np.pi * folds * samples) ** 2)
+    found = term_shapes(cycles / sample_s, sample_s, SpectrumTerms(("G",), correlation_s=tau))[:, 0]
+    assert found == pytest.approx((density * np.sinc(folds) ** 2).sum(axis=0), rel=1e-6)
 
 
 def test_what_the_ends_of_a_smooth_series_add_is_flat_once_differenced_twice() -> None:
