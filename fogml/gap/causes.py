@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray
+from fogml.arrays import BoolArray
 from fogml.gap.cards import Card, beside_others
-from fogml.gap.field import Field, Member
+from fogml.gap.field import Field
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import LinearGaussian
@@ -124,9 +124,3 @@ def onset(found: Inference, every: Foretold, cause: Cause) -> Onset | None:
         return None
     run, row = places[best]
     return Onset(scene.runs[run].run.name, float(scene.runs[run].time_s[row]), gain)
-
-
-def energy(found: Inference, every: Foretold, member: Member) -> float:
-    """Squares of what a cause makes on the fit runs [(deg/h)^2]."""
-    parts: list[FloatArray] = [every.of_member(i, member) for i in range(found.scene.fitted)]
-    return float(sum(np.sum((p - p.mean()) ** 2) for p in parts))

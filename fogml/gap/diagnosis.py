@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals
-from fogml.gap.causes import energy, found_cause
+from fogml.gap.causes import found_cause
 from fogml.gap.compensation import compensation_of
 from fogml.gap.fitted_model import Explained, explained
 from fogml.gap.how_far import Foretold, HeldOut
@@ -30,7 +30,7 @@ from fogml.gap.reports import (
 from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.result_parts import Nearest, WhatIf
 from fogml.gap.settings import STANDARD, Priors
-from fogml.gap.shares import cause_shares
+from fogml.gap.shares import cause_shares, energy
 from fogml.gap.where import GapOnRun, where
 from fogml.processes import one_thread
 from fogml.runs.names import named_apart
@@ -197,7 +197,7 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
         GapOnRun(r, r.gap - recalibrated.on(i), every.on(i) - every.constants_on(i))
         for i, r in enumerate(scene.fit)
     ]
-    stages = stage_energies(found, {m: energy(found, every, m) for m in likeliest})
+    stages = stage_energies(found, {m: energy(found, every, recalibrated, m) for m in likeliest})
     lies = where(gaps, stages, found.points.fit.model, settings)
     evidence = candidate_evidence(found, judged, [i for f in items if f.named for i in f.members])
     what_if = _what_if(found, named, held_out)

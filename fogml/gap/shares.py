@@ -79,15 +79,27 @@ def _group_courses(
 
     Shape (m, groups, 1 + draws) for each run.
     """
-    scene, held = found.scene, found.field
     drawn = every.drawn(rng)
     parts = [
         np.stack([np.sum([every.part(i, m, drawn) for m in group], axis=0) for group in groups], axis=1)
-        for i in range(scene.fitted)
+        for i in range(found.scene.fitted)
     ]
-    flat = held.whitening.stacked([p.reshape(len(p), -1) for p in parts])
-    taken = recalibrated.posterior.covariance @ (held.fixed.T @ flat)
+    return beyond_constants(found, recalibrated, parts)
+
+
+def beyond_constants(
+    found: Inference, recalibrated: Foretold, parts: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """What causes make on each fit run [deg/h], shape (m_r, ...), less what the constants would take up."""
+    flat = found.field.whitening.stacked([p.reshape(len(p), -1) for p in parts])
+    taken = recalibrated.posterior.covariance @ (found.field.fixed.T @ flat)
     return [p - (found.setting.fixed[i] @ taken).reshape(p.shape) for i, p in enumerate(parts)]
+
+
+def energy(found: Inference, every: Foretold, recalibrated: Foretold, member: Member) -> float:
+    """Squares of what a cause makes on the fit runs beyond the constants [(deg/h)^2]."""
+    parts = [every.of_member(i, member) for i in range(found.scene.fitted)]
+    return float(sum(np.sum(p**2) for p in beyond_constants(found, recalibrated, parts)))
 
 
 def _told(groups: Iterable[str], values: FloatArray, run: str | None, regime: str | None) -> list[CauseShare]:

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fogml.arrays import FloatArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.gap.result_parts import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
 from fogml.gap.rows import Rows
 from fogml.gap.settings import STANDARD, Reported
@@ -24,12 +24,23 @@ from fogml.signals.noise_model import NoiseModel
 
 @dataclass(frozen=True, eq=False)
 class Averages:
-    """Rows of a run averaged over windows of `window_s` [s]; windows don't reach over gaps."""
+    """Rows of a run averaged over windows of `window_s` [s]; windows don't reach over gaps.
 
-    starts: np.ndarray
+    Attributes
+    ----------
+    starts, window_s
+        First row of each window, those cut short at a gap or the end among them; length of a full one.
+    time, stretch
+        Middle of each full window [s], and number of the stretch between gaps that it is in, shape (k,).
+    full
+        Which windows are full.
+    """
+
+    starts: IndexArray
     window_s: float
     time: FloatArray
-    full: np.ndarray
+    stretch: IndexArray
+    full: BoolArray
 
     def of(self, rows: FloatArray) -> FloatArray:
         """Averages of a series of rows, shape (m,) to (k,)."""
@@ -38,17 +49,19 @@ class Averages:
 
 
 def averages(rows: Rows, averaging_s: float = Reported.averaging_s) -> Averages:
-    """Windows of about `averaging_s` over a run's rows; one row each where rows are longer."""
+    """Windows of about `averaging_s` over a run's rows: one row each where rows are longer, shorter ones
+    where no stretch between gaps is as long.
+    """
     width = max(1, round(averaging_s / rows.row_s))
     breaks = np.flatnonzero(np.diff(rows.time_s) > 2.5 * rows.row_s) + 1
     edges = [0, *breaks.tolist(), len(rows)]
     starts = np.concatenate([np.arange(a, b, width) for a, b in pairwise(edges)])
     counts = np.diff(starts, append=len(rows))
-    full = counts == width
-    if not full.any():
-        full = counts > 0
-    time = np.add.reduceat(rows.time_s, starts) / counts
-    return Averages(starts, width * rows.row_s, time[full], full)
+    longest = int(counts.max())
+    full = counts == longest
+    time = (np.add.reduceat(rows.time_s, starts) / counts)[full]
+    stretch = np.searchsorted(breaks, starts[full], side="right")
+    return Averages(starts, longest * rows.row_s, time, stretch, full)
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,15 +237,17 @@ def _timescales(
 
 
 def _segments(h: _Averaged, shortest_s: float) -> list[GapSegment]:
-    """Stretches in which the systematic part's averages exceed the floor."""
-    over = np.abs(h.systematic) > h.floor**0.5
-    if not over.any():
-        return []
-    step = h.windows.window_s
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], over.astype(np.int8), [0]])))
+    """Stretches in which the systematic part's averages exceed the floor; none reaches over a gap."""
+    over, windows = np.abs(h.systematic) > h.floor**0.5, h.windows
+    # A place before each stretch, at which nothing is over.
+    at = np.arange(len(over)) + windows.stretch + 1
+    held = np.zeros(at[-1] + 2, dtype=np.int8)
+    held[at] = over
+    edges = np.flatnonzero(np.diff(held)).reshape(-1, 2)
     segments = []
-    for first, last in zip(edges[::2], edges[1::2]):
-        start, end = h.windows.time[first] - 0.5 * step, h.windows.time[last - 1] + 0.5 * step
+    for first, last in np.searchsorted(at, edges + 1).tolist():
+        start = windows.time[first] - 0.5 * windows.window_s
+        end = windows.time[last - 1] + 0.5 * windows.window_s
         if end - start >= shortest_s:
             excess = float(np.mean(h.gap[first:last] ** 2)) - h.floor[0]
             segments.append(GapSegment(h.run, float(start), float(end), _root(excess)))

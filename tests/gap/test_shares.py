@@ -1,11 +1,21 @@
 """Shares of the gap's energy against Shapley's value from all orders."""
 
+from dataclasses import replace
 from itertools import permutations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from fogml.gap.shares import shapley_values
+from fogml.gap.field import Member
+from fogml.gap.how_far import Foretold
+from fogml.gap.inference import foreseen
+from fogml.gap.model import TwinModel
+from fogml.gap.settings import STANDARD
+from fogml.gap.shares import energy, shapley_values
+from fogml.runs.run import Run
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.twin_file import load_twin
 
 
 def test_values_are_what_each_cause_adds_on_average_over_all_orders():
@@ -22,3 +32,25 @@ def test_values_are_what_each_cause_adds_on_average_over_all_orders():
     values = shapley_values(gap, courses).sum(axis=0)
     assert values == pytest.approx(expected, rel=1e-12)
     assert values.sum() == pytest.approx(taken((0, 1, 2)))
+
+
+def test_energy_is_of_what_constants_do_not_take_up():
+    """A constant of each run has energy but for the part that all have in common: the bias."""
+    time, sizes = 60.0 * np.arange(400), np.array([4.1, 3.8, 4.4])
+    course = 25.0 + 30.0 * np.sin(time / 3000.0)
+    runs = [Run.from_columns(f"r{i}", time=time, gyro=np.zeros(400), T=course) for i in range(3)]
+    held = foreseen(TwinModel(load_twin("nominal")), runs, NoiseModel(0.002, 0.0, 0.0), STANDARD).field
+    scene = held.setting.scene
+    held.base = replace(
+        held.base, data=held.whitening.stacked([np.full(len(r), size) for r, size in zip(scene.fit, sizes)])
+    )
+    node = next(
+        i
+        for i, n in enumerate(held.columns.nodes)
+        if held.columns.families[n.family].id == "turn_on_bias" and i in held.at
+    )
+    member = Member(held.columns.nodes[node].family, node, 1e4)
+    found = SimpleNamespace(field=held, scene=scene, setting=held.setting, columns=held.columns)
+    every, recalibrated = Foretold.of(found, (member,)), Foretold.of(found, ())
+    expected = len(scene.fit[0]) * np.sum((sizes - sizes.mean()) ** 2)
+    assert energy(found, every, recalibrated, member) == pytest.approx(expected, rel=0.01)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.settings import STANDARD
-from fogml.gap.where import GapOnRun, _temperatures, where
+from fogml.gap.where import GapOnRun, _temperatures, averages, where
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -21,13 +21,15 @@ ROOT = np.linalg.cholesky(NOISE.covariance(TIME, 10.0, NOISE.ladder(10.0, 30.0 *
 
 
 class Rows:
-    """The run, a row a sample."""
+    """The run, or what is kept of it, a row a sample."""
 
-    run, time_s, row_s, temperature = RUN, TIME, 10.0, TEMPERATURE
-    regime = regimes(RUN).labels
+    run, row_s = RUN, 10.0
+
+    def __init__(self, kept=slice(None)):
+        self.time_s, self.temperature, self.regime = TIME[kept], TEMPERATURE[kept], regimes(RUN).labels[kept]
 
     def __len__(self):
-        return len(TIME)
+        return len(self.time_s)
 
 
 def located(added, seed=0, systematic=None, stages=None):
@@ -66,6 +68,30 @@ def test_segments_are_where_it_was_and_not_shorter_than_ten_minutes(bump):
     assert segment.to_s == pytest.approx(4000.0, abs=100.0)
     assert segment.to_s - segment.from_s >= STANDARD.reported.segment_s
     assert segment.excess_rms == pytest.approx(0.5, abs=0.15)
+
+
+def test_no_segment_reaches_over_a_gap_of_the_record():
+    """What exceeds on both sides of a gap is two segments, and nothing is said of the hours between."""
+    kept = (TIME < 2500.0) | (TIME >= 6000.0)
+    added = 0.5 * ((TIME >= 1500.0) & (TIME < 7000.0))[kept]
+    rows, noise = Rows(kept), (ROOT @ np.random.default_rng(1).standard_normal(len(RUN)))[kept]
+    found = where([GapOnRun(rows, added + noise, added)], {}, NOISE).segments
+    assert [(s.from_s, s.to_s) for s in found] == [
+        pytest.approx((1495.0, 2495.0), abs=100.0),
+        pytest.approx((5995.0, 6995.0), abs=100.0),
+    ]
+
+
+def test_windows_of_stretches_that_are_shorter_are_as_long_as_those():
+    kept = (np.arange(1000) % 8 < 5) & (np.arange(1000) < 803)
+    rows = Rows(kept)
+    windows = averages(rows, 100.0)
+    # A hundred stretches of five rows, and a last one of three.
+    assert windows.window_s == 50.0 and len(windows.time) == 100
+    white = np.random.default_rng(2).standard_normal(len(rows))
+    expected = white[:500].reshape(100, 5).mean(axis=1)
+    assert windows.of(white) == pytest.approx(expected)
+    assert list(windows.stretch) == list(range(100))
 
 
 def test_temperatures_of_the_gap_are_those_where_it_was():
