@@ -134,7 +134,7 @@ def _figures(marks: Sequence[DriftMark]) -> dict[str, Any]:
 
 
 def geometric_mean(values: Sequence[float]) -> Estimate:
-    """The geometric mean with the interval of the central limit theorem for the logarithms.
+    """The geometric mean with the interval of Student's t for the logarithms.
 
     With a value of zero, as of an answer without any error, it is zero and has none.
     """

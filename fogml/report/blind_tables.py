@@ -259,6 +259,11 @@ def confusion_plot(values: Mapping[str, Any]) -> Drawing:
     )
 
 
+def _arm(high: float | None, low: float | None) -> float:
+    """Length of an arm of an error bar; 0 where an end is not told."""
+    return 0.0 if high is None or low is None else high - low
+
+
 def strata_plot(rows: Sequence[Mapping[str, Any]]) -> Drawing:
     """How some figures grow better with the strength of what is missing."""
     figure = go.Figure()
@@ -272,8 +277,8 @@ def strata_plot(rows: Sequence[Mapping[str, Any]]) -> Drawing:
             x=names,
             y=values,
             error_y={
-                "array": [(p["high"] or 0.0) - (p["value"] or 0.0) for p in parts.values()],
-                "arrayminus": [(p["value"] or 0.0) - (p["low"] or 0.0) for p in parts.values()],
+                "array": [_arm(p["high"], p["value"]) for p in parts.values()],
+                "arrayminus": [_arm(p["value"], p["low"]) for p in parts.values()],
                 "thickness": 1,
             },
             mode="lines+markers",

@@ -243,7 +243,7 @@ def test_an_interval_of_a_share_ends_at_one():
     shares = np.array([1.0, 0.9, 1.0])
     marks = [DriftMark(str(i), "own", 1.0, 0.5, 0.1, share, 0.2, None) for i, share in enumerate(shares)]
     told = drift_figures(marks)["all"]["coverage"]
-    half = 1.959964 * shares.std(ddof=1) / np.sqrt(3)
+    half = 4.302653 * shares.std(ddof=1) / np.sqrt(3)
     assert told["value"] == pytest.approx(shares.mean())
     assert told["low"] == pytest.approx(shares.mean() - half) and told["high"] == 1.0 < shares.mean() + half
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from fogml.blind.baselines.learners import abstain, gp_discrepancy, oracle
-from fogml.blind.baselines.regression import bic, bic_fixed_nominal
+from fogml.blind.baselines.regression import Regression, bic, bic_fixed_nominal
 from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.methods import METHODS, load_method
 from fogml.blind.relatives import relatives_of
@@ -67,6 +68,18 @@ def test_forward_selection_finds_an_effect_of_the_twin_itself(suite: BlindFolder
 def test_constants_held_fixed_name_what_is_not_there(suite: BlindFolder, tmp_path: Path) -> None:
     bic_fixed_nominal(case_files(suite.cases / "0001"), tmp_path)
     assert named(json.loads((tmp_path / "gap.json").read_text()))
+
+
+def test_least_squares_weigh_columns_once(suite: BlindFolder) -> None:
+    """Without rows of priors, weighed columns are as long as plain ones: they were weighed again."""
+    for free in (True, False):
+        problem = Regression(case_files(suite.cases / "0002"), free=free, grid=False)
+        one = problem.columns[:, [0]]
+        found = problem.fit(one)
+        design = np.concatenate([problem.constants, one], axis=1)
+        wanted = np.linalg.lstsq(design / np.linalg.norm(design, axis=0), problem.target, rcond=None)[0]
+        wanted /= np.linalg.norm(design, axis=0)
+        assert found.amplitudes == pytest.approx(wanted[-1:], rel=1e-6)
 
 
 def test_a_process_over_the_twin_says_unknown_where_there_is_more_than_noise(

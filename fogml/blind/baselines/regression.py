@@ -55,7 +55,8 @@ class Regression:
         self.stack = rough
         if free:
             # Effects that falsify an input act by way of the constants: take them about fitted ones.
-            about = dict(zip(rough.constants, self.fit(np.zeros((len(rough), 0))).constants.tolist()))
+            found = self.fit(np.zeros((len(self.target), 0))).constants
+            about = dict(zip(rough.constants, found.tolist()))
             self.stack = Stack(case.fit, about)
         self.atoms = atoms(self.stack.model.candidates(), case.without, grid)
 
@@ -111,8 +112,6 @@ class Regression:
 
     def fit(self, columns: FloatArray) -> Fit:
         """Constants and amplitudes for some atoms' weighted columns, shape (rows, k)."""
-        if len(columns) == len(self.stack):
-            columns = self.weighted(columns)
         design = np.concatenate([self.constants, columns], axis=1)
         scale = np.linalg.norm(design, axis=0)
         scale[scale == 0.0] = 1.0
