@@ -9,9 +9,10 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import cho_solve, solve_triangular
 
 from fogml.arrays import FloatArray
-from fogml.gap.linear_gaussian import LinearGaussian, Posterior
+from fogml.gap.linear_gaussian import LinearGaussian, Posterior, prior_factor
 from fogml.gap.model import AnyModel, Constant
 from fogml.gap.rows import READ, READ_GROUPS, Rows, slopes, through_nominal
 from fogml.gap.scene import Scene, steps_are_coarse
@@ -31,6 +32,8 @@ class Setting:
     ----------
     fixed
         Responses to one prior standard deviation, shape (m_r, p) for each run; constants first.
+    errors
+        What errors of each fit run's readings make of its replay, columns of unit priors, shape (m_r, k_r).
     values
         The constants at which effects meet the output: as fitted beside nothing, to begin with.
     widened
@@ -43,6 +46,7 @@ class Setting:
     fixed: tuple[FloatArray, ...]
     values: Mapping[str, float]
     widened: Mapping[str, float] = field(default_factory=dict)
+    errors: tuple[FloatArray, ...] = ()
 
     @property
     def deviations(self) -> FloatArray:
@@ -67,33 +71,63 @@ def whitener_of(noise: NoiseModel, rows: Rows, longest_runs: float = NoiseSettin
     return Whitener(noise, rows.end_s, rows.row_s, noise.ladder(rows.row_s, longest_runs * span))
 
 
+class RunWhitening:
+    """Whitens series over the rows of one run by a noise, and by errors of its readings.
+
+    Those, columns A of unit priors once whitened by the noise, add A A' to the covariance. With
+    I + A'A = C C' an inverse root of I + A A' is I - A (C' + I)^-1 C^-1 A'
+    (A. Andrews, AIAA Journal 6 (1968) 1165).
+    """
+
+    def __init__(self, noise: NoiseModel, rows: Rows, longest_runs: float, errors: FloatArray) -> None:
+        self._whitener = whitener_of(noise, rows, longest_runs)
+        extra = (1.0 / rows.weight**2 - 1.0) * noise.white_density / rows.row_s
+        self._weight = 1.0 / np.sqrt(1.0 + extra / self._whitener.deviation**2)
+        self._raw, self._errors = errors, self._by_noise(errors)
+        self.log_det = self._whitener.log_det - float(np.sum(np.log(self._weight)))
+        if errors.size:
+            self._factor = factor = prior_factor(self._errors.T @ self._errors)
+            beside = solve_triangular(factor + np.eye(len(factor)), self._errors.T, lower=True)
+            self._taken = solve_triangular(factor, beside, lower=True, trans=1).T
+            self.log_det += float(np.sum(np.log(np.diagonal(factor))))
+
+    def _by_noise(self, values: FloatArray) -> FloatArray:
+        white = self._whitener.whiten(values)
+        white *= self._weight if white.ndim == 1 else self._weight[:, None]
+        return white
+
+    def whiten(self, values: FloatArray) -> FloatArray:
+        """Series of shape (m, ...), whitened."""
+        white = self._by_noise(values)
+        if self._errors.size:
+            white -= self._taken @ (self._errors.T @ white)
+        return white
+
+    def errors_in(self, values: FloatArray) -> FloatArray:
+        """What of series of shape (m, ...) is errors of the readings, by their posterior mean."""
+        if not self._raw.size:
+            return np.zeros(values.shape)
+        along = self._errors.T @ self._by_noise(values)
+        return np.asarray(self._raw @ cho_solve((self._factor, True), along))
+
+
 class Whitening:
-    """Whitens series over the rows of the fit runs by one noise; readings' noise adds to it."""
+    """Whitens series over the rows of the fit runs by one noise and by errors of each run's readings."""
 
     def __init__(self, noise: NoiseModel, setting: Setting) -> None:
         self.noise = noise
-        self._whiteners, self._weights = [], []
-        for rows in setting.scene.fit:
-            held = whitener_of(noise, rows, setting.priors.noise.longest_runs)
-            extra = (1.0 / rows.weight**2 - 1.0) * noise.white_density / rows.row_s
-            self._whiteners.append(held)
-            self._weights.append(1.0 / np.sqrt(1.0 + extra / held.deviation**2))
+        fit, longest = setting.scene.fit, setting.priors.noise.longest_runs
+        errors = setting.errors or [np.zeros((len(rows), 0)) for rows in fit]
+        self.runs = [RunWhitening(noise, rows, longest, own) for rows, own in zip(fit, errors, strict=True)]
 
     def stacked(self, series: Sequence[FloatArray]) -> FloatArray:
         """Series of each fit run, shape (m_r, ...), whitened and one after the other; others left out."""
-        parts = []
-        for values, whitener, weight in zip(series, self._whiteners, self._weights):
-            white = whitener.whiten(values)
-            white *= weight if white.ndim == 1 else weight[:, None]
-            parts.append(white)
-        return np.concatenate(parts)
+        return np.concatenate([run.whiten(values) for values, run in zip(series, self.runs)])
 
     @cached_property
     def log_det(self) -> float:
         """Half the logarithm of the determinant of the rows' covariance."""
-        return float(
-            sum(w.log_det - np.sum(np.log(weight)) for w, weight in zip(self._whiteners, self._weights))
-        )
+        return sum(run.log_det for run in self.runs)
 
 
 def setting_of(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise: NoiseModel) -> Setting:
@@ -104,15 +138,9 @@ def setting_of(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise
     noises = [float(np.median(whitener_of(noise, r, priors.noise.longest_runs).deviation)) for r in scene.fit]
     for _ in range(3):
         least = [priors.noise.least_error * by for by in noises]
-        errors = [_reading_errors(r, setting.values, by) for r, by in zip(scene.fit, least)]
-        ends = np.cumsum([0, *(e.shape[1] for e in errors)])
-        blocks = []
-        for i, r in enumerate(scene.runs):
-            wide = np.zeros((len(r), int(ends[-1])))
-            if i < scene.fitted:
-                wide[:, ends[i] : ends[i + 1]] = errors[i]
-            blocks.append(np.concatenate([fixed_columns(setting, i, plant), wide], axis=1))
-        fixed = tuple(blocks)
+        errors = (_reading_errors(r, setting.values, by) for r, by in zip(scene.fit, least))
+        setting = replace(setting, errors=tuple(errors))
+        fixed = tuple(fixed_columns(setting, i, plant) for i in range(len(scene.runs)))
         whitening = Whitening(noise, setting)
         found = Posterior.of(whitening.stacked(fixed), whitening.stacked([r.gap for r in scene.fit]))
         values = setting.values_of(found.mean)

@@ -68,13 +68,15 @@ class Foretold:
         return np.concatenate(parts, axis=1)
 
     def on(self, run: int) -> FloatArray:
-        """What is foretold [deg/h], shape (m,)."""
+        """What is foretold [deg/h], shape (m,); of a fit run with what errors of its readings made."""
         design, rows = self.design(run), self.found.scene.runs[run]
         total = np.asarray(design @ self.posterior.mean[: design.shape[1]])
         for form, unknowns in self.forms.values():
             total = total + form.on(run, unknowns)
         for declared, had in self.replaced:
             total = total - rows.made(declared, had.amplitude, had.shape, self.found.setting.values)
+        if run < self.found.scene.fitted:
+            total = total + self.found.field.whitening.runs[run].errors_in(rows.gap - total)
         return total
 
     def left_on(self, run: int) -> FloatArray:
@@ -129,11 +131,6 @@ class Foretold:
                 return np.asarray(self.design(run)[:, at : at + width] @ coefficients[at : at + width])
             at += width
         raise ValueError("not a member")
-
-    def constants_on(self, run: int) -> FloatArray:
-        """What the fixed block alone makes of a run [deg/h], shape (m,)."""
-        count = self.found.field.fixed.shape[1]
-        return np.asarray(self.design(run)[:, :count] @ self.posterior.mean[:count])
 
     def drawn(self, rng: np.random.Generator) -> FloatArray:
         """The mean of the coefficients, then draws from their posterior, shape (q, 1 + draws)."""

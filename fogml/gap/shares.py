@@ -91,9 +91,11 @@ def beyond_constants(
     found: Inference, recalibrated: Foretold, parts: Sequence[FloatArray]
 ) -> list[FloatArray]:
     """What causes make on each fit run [deg/h], shape (m_r, ...), less what the constants would take up."""
-    flat = found.field.whitening.stacked([p.reshape(len(p), -1) for p in parts])
-    taken = recalibrated.posterior.covariance @ (found.field.fixed.T @ flat)
-    return [p - (found.setting.fixed[i] @ taken).reshape(p.shape) for i, p in enumerate(parts)]
+    flat = [p.reshape(len(p), -1) for p in parts]
+    taken = recalibrated.posterior.covariance @ (found.field.fixed.T @ found.field.whitening.stacked(flat))
+    left = [p - found.setting.fixed[i] @ taken for i, p in enumerate(flat)]
+    shown = (p - run.errors_in(p) for p, run in zip(left, found.field.whitening.runs))
+    return [own.reshape(p.shape) for own, p in zip(shown, parts)]
 
 
 def energy(found: Inference, every: Foretold, recalibrated: Foretold, member: Member) -> float:
