@@ -147,8 +147,9 @@ def record_run(
     ------
     InputError
         If the run is empty, of another unit or axis, does not state the attitude that tells Earth rate while
-        the model knows it, holds fewer than `LEAST_WINDOWS` averages, one value in every sample,
-        more spoilt samples than `most_spoilt`, or numbers that can't be what the run states of its output.
+        the model knows it, has samples further apart than the averaging time, fewer than `LEAST_WINDOWS`
+        averages, one value in every sample, more spoilt samples than `most_spoilt`, or numbers that can't be
+        what the run states of its output.
     """
     recording = _Recording(model, averaging_s)
     for block, evaluation in evaluate_blocks(model, blocks, any_unit=any_unit):
@@ -158,6 +159,11 @@ def record_run(
         raise InputError("the run holds no samples, there is nothing to monitor")
     if recording.low == recording.high:
         raise InputError(f"{first.name}: {dead_words(recording.low)}; it is not kept, record it again")
+    if averaging_s < (1.0 - 1e-6) * recording.means.sample_s:
+        raise InputError(
+            f"{first.name}: a sample every {recording.means.sample_s:g} s makes no averages over "
+            f"{averaging_s:g} s; set --averaging to that interval or more"
+        )
     time, mean = recording.means.values()
     used, is_inside = _used(mean, first.name, averaging_s)
     recording.hold_usable(is_inside, most_spoilt)
@@ -293,7 +299,7 @@ class _Means:
     def __init__(self, window_s: float) -> None:
         self.window_s = window_s
         self.start: float | None = None
-        self.parts: list[tuple[IntArray, IntArray, dict[str, FloatArray]]] = []
+        self.parts: list[tuple[IntArray, dict[str, FloatArray]]] = []
         self.sample_s = 0.0
 
     def add(self, time: FloatArray, kept: BoolArray, **columns: FloatArray) -> None:
@@ -303,26 +309,20 @@ class _Means:
             self.sample_s = float(np.median(np.diff(time))) if len(time) > 1 else self.window_s
         window = window_numbers(time[kept], self.start, self.sample_s, self.window_s).astype(np.int64)
         names, place = np.unique(window, return_inverse=True)
-        counts: IntArray = np.bincount(place, minlength=len(names)).astype(np.int64)
         sums: dict[str, FloatArray] = {
             name: np.asarray(np.bincount(place, values[kept], minlength=len(names)), dtype=np.float64)
-            for name, values in {"time": time, **columns}.items()
+            for name, values in {"count": np.ones(len(time)), "time": time, **columns}.items()
         }
-        self.parts.append((np.asarray(names, dtype=np.int64), counts, sums))
+        self.parts.append((np.asarray(names, dtype=np.int64), sums))
 
     def values(self) -> tuple[FloatArray, dict[str, FloatArray]]:
         """Mean times [s] and columns of the windows that are at least half full, each of shape (m,)."""
-        every = np.concatenate([names for names, _, _ in self.parts])
-        names, place = np.unique(every, return_inverse=True)
-        counts = np.bincount(place, np.concatenate([count for _, count, _ in self.parts]), len(names))
-        full = counts * self.sample_s >= 0.5 * self.window_s
-        means = {
-            name: (
-                np.bincount(place, np.concatenate([sums[name] for _, _, sums in self.parts]), len(names))[
-                    full
-                ]
-                / counts[full]
-            )
-            for name in self.parts[0][2]
+        names, place = np.unique(np.concatenate([names for names, _ in self.parts]), return_inverse=True)
+        sums: dict[str, FloatArray] = {
+            name: np.bincount(place, np.concatenate([held[name] for _, held in self.parts]), len(names))
+            for name in self.parts[0][1]
         }
+        counts = sums.pop("count")
+        full = counts * self.sample_s >= 0.5 * self.window_s
+        means = {name: total[full] / counts[full] for name, total in sums.items()}
         return means.pop("time"), means

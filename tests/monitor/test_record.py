@@ -131,6 +131,9 @@ def test_a_run_that_is_too_short_is_refused(model, tmp_path):
     run = read_run(write_run(tmp_path, 9))
     with pytest.raises(InputError, match="16 are needed"):
         record_run(model, [run[:150]])
+    with pytest.raises(InputError, match="a sample every 4 s makes no averages over 1 s"):
+        record_run(model, [run], averaging_s=1.0)
+    assert record_run(model, [run], averaging_s=4.0).averaging_s == 4.0
     with pytest.raises(InputError, match="no samples"):
         record_run(model, [])
 
