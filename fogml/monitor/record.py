@@ -318,9 +318,10 @@ class _Means:
     def values(self) -> tuple[FloatArray, dict[str, FloatArray]]:
         """Mean times [s] and columns of the windows that are at least half full, each of shape (m,)."""
         names, place = np.unique(np.concatenate([names for names, _ in self.parts]), return_inverse=True)
+        columns = {name: np.concatenate([held[name] for _, held in self.parts]) for name in self.parts[0][1]}
         sums: dict[str, FloatArray] = {
-            name: np.bincount(place, np.concatenate([held[name] for _, held in self.parts]), len(names))
-            for name in self.parts[0][1]
+            name: np.asarray(np.bincount(place, values, len(names)), dtype=np.float64)
+            for name, values in columns.items()
         }
         counts = sums.pop("count")
         full = counts * self.sample_s >= 0.5 * self.window_s
