@@ -198,7 +198,8 @@ def floor_model(
     drifts
         Whether noise that rises like a random walk counts as drift; for a static run it is the gyro's own.
     """
-    parts = quiet_parts(values, starts, stops, max(int(averaging_s / sample_s / PER_WINDOW), 1))
+    width = max(int(averaging_s / sample_s / PER_WINDOW), 1)
+    parts = quiet_parts(values, starts, stops, width)
     stretches = [without_spikes(values[a:b]) for a, b in parts]
     if all(np.ptp(part) == 0.0 for part in stretches):
         return None
@@ -238,8 +239,10 @@ def floor_model(
     weights = np.exp(np.array(evidence) - max(evidence))
     live = np.flatnonzero(weights > _LIGHT)
     chosen = weights[live] / weights[live].sum()
-    whole = int(np.sum(stops - starts))
-    loud = 1.0 - sum(map(len, stretches)) / whole
+    # Stretches without a step between two means are left out for that, and not as loud.
+    lengths = stops - starts
+    judged = int(lengths[lengths >= 2 * width].sum())
+    loud = 1.0 - sum(map(len, stretches)) / max(judged, 1)
     whole_model = fits[-1][0]
     found, shares = slow_fits(whole_model, own[1:])
     any_size = tuple((whole_model, fit) for fit in found)

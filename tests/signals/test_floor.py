@@ -98,6 +98,15 @@ def test_loud_parts_that_are_left_out_are_told():
     assert noise_floor(steady, 1.0, 100.0).source == "the run itself"
 
 
+def test_stretches_too_short_to_tell_are_not_loud():
+    noise = np.random.default_rng(3).normal(size=3200)
+    short = [(first, first + 8) for first in range(2000, 3200, 8)]
+    assert noise_floor(noise, 1.0, 100.0, segments=[(0, 2000), *short]).source == "the run itself"
+    noise[700:1000] *= 20.0
+    told = noise_floor(noise, 1.0, 100.0, segments=[(0, 2000), *short]).source
+    assert told.startswith("the run itself without the 1") and told.endswith("that is loud")
+
+
 def expected(windows: int, white: float, flicker: float, over_s: float = 100.0) -> float:
     """Floor of averages of white noise of a size per sample and flicker of B, from the covariance."""
     model = NoiseModel(white / 60.0, flicker)
