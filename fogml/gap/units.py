@@ -25,7 +25,7 @@ from fogml.gap.search import Explanation
 from fogml.gap.settings import Priors
 from fogml.numerals import probability_words, short
 from fogml.runs.run import Run
-from fogml.signals.restricted import random_effects
+from fogml.signals.restricted import next_value, random_effects
 from fogml.twin.twin import Twin
 
 SCHEMA = "fogml.gap_units/1"
@@ -237,8 +237,9 @@ def _going_over(
     """Mean, spread from unit to unit, and where the next unit's size lies; None of one unit."""
     if len(sizes) < 2:
         return None, None, None
-    held = random_effects([s.value for s in sizes.values()], [s.se for s in sizes.values()])
-    return Estimate(held.mean, held.se, unit), held.between, held.next_value()
+    told = [s.value for s in sizes.values()], [s.se for s in sizes.values()]
+    held = random_effects(*told)
+    return Estimate(held.mean, held.se, unit), held.between, next_value(*told)
 
 
 def _prior(told: Sequence[_Told], names: frozenset[str]) -> float:

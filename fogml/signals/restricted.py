@@ -19,10 +19,12 @@ from scipy.optimize import minimize_scalar
 
 from fogml.arrays import FloatArray
 from fogml.intervals import LEVEL
-from fogml.signals.distributions import normal_ppf, student_ppf
+from fogml.signals.distributions import normal_ppf, student_ppf, students_ppf
 
 _AT_ONCE = 16
 """Models weighed together."""
+_WIDEST, _SIZES = 5.0, 101
+"""Widest deviation between units that is thought possible, in the values' own, and how many up to it."""
 
 
 @dataclass(frozen=True)
@@ -131,11 +133,6 @@ class RandomEffects:
         reach = float(student_ppf(tail, self.count - 1) if self.count > 1 else normal_ppf(tail)) * self.se
         return self.mean - reach, self.mean + reach
 
-    def next_value(self, level: float = LEVEL) -> tuple[float, float]:
-        """Where the next unit's true value lies with a probability; by Student's t of as many units."""
-        reach = float(student_ppf(0.5 + 0.5 * level, self.count - 1)) * float(np.hypot(self.se, self.between))
-        return self.mean - reach, self.mean + reach
-
 
 def random_effects(values: ArrayLike, errors: ArrayLike) -> RandomEffects:
     """Mean and deviation between units of n values with standard errors, by restricted likelihood."""
@@ -147,18 +144,42 @@ def random_effects(values: ArrayLike, errors: ArrayLike) -> RandomEffects:
         deviation = float(x.std(ddof=1))
         return RandomEffects(float(x.mean()), deviation / np.sqrt(len(x)), deviation, len(x))
 
-    def mean_of(variance: float) -> tuple[float, float]:
-        weights = 1.0 / (variance + se**2)
-        return float(weights @ x / weights.sum()), float(weights.sum())
-
-    def negative(variance: float) -> float:
-        mean, total = mean_of(variance)
-        spread = variance + se**2
-        return 0.5 * float(np.sum(np.log(spread) + (x - mean) ** 2 / spread)) + 0.5 * np.log(total)
+    def negative(root: float) -> float:
+        return -float(_between(x, se, np.array([root]))[0][0])
 
     # No deviation is larger than that of the values themselves, by a margin for few.
-    top = 10.0 * float(np.var(x, ddof=1)) + 1e-300
-    found = minimize_scalar(lambda root: negative(root**2), bounds=(0.0, np.sqrt(top)), method="bounded")
-    variance = float(found.x**2) if found.fun < negative(0.0) else 0.0
-    mean, total = mean_of(variance)
-    return RandomEffects(mean, float(1.0 / np.sqrt(total)), float(np.sqrt(variance)), len(x))
+    top = np.sqrt(10.0 * float(np.var(x, ddof=1)) + 1e-300)
+    found = minimize_scalar(negative, bounds=(0.0, top), method="bounded")
+    between = float(found.x) if found.fun < negative(0.0) else 0.0
+    _, mean, error = _between(x, se, np.array([between]))
+    return RandomEffects(float(mean[0]), float(error[0]), between, len(x))
+
+
+def next_value(values: ArrayLike, errors: ArrayLike, level: float = LEVEL) -> tuple[float, float]:
+    """Where the next unit's true value lies with a probability, from two units' values or more.
+
+    Deviations between units are weighed by their restricted likelihood: the likeliest alone is none, often,
+    where units differ by no more than their errors.
+    """
+    x, se = np.asarray(values, dtype=np.float64), np.asarray(errors, dtype=np.float64)
+    tails = np.array([0.5 - 0.5 * level, 0.5 + 0.5 * level])
+    own = float(x.std(ddof=1))
+    if own == 0.0 or not np.all(se > 0.0):
+        ends = x.mean() + own * np.sqrt(1.0 + 1.0 / len(x)) * student_ppf(tails, len(x) - 1)
+    else:
+        between = own * np.linspace(0.0, _WIDEST, _SIZES)
+        likelihood, means, deviations = _between(x, se, between)
+        weights = np.exp(likelihood - likelihood.max())
+        spreads = np.hypot(between, deviations)
+        ends = students_ppf(tails, weights / weights.sum(), means, spreads, np.inf)
+    return float(ends[0]), float(ends[1])
+
+
+def _between(x: FloatArray, se: FloatArray, deviations: FloatArray) -> tuple[FloatArray, ...]:
+    """Restricted log likelihood of deviations between units, the mean and its error by each, shape (m,)."""
+    variances = deviations[:, None] ** 2 + se**2
+    total = np.sum(1.0 / variances, axis=1)
+    means = np.sum(x / variances, axis=1) / total
+    square = np.sum((x - means[:, None]) ** 2 / variances, axis=1)
+    likelihood = -0.5 * (np.sum(np.log(variances), axis=1) + square + np.log(total))
+    return likelihood, means, 1.0 / np.sqrt(total)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from fogml.signals.restricted import random_effects
+from fogml.signals.restricted import next_value, random_effects
 
 
 def test_they_are_the_line_s():
@@ -35,14 +36,28 @@ def test_with_equal_errors_it_is_the_plain_mean_and_what_the_variance_has_above_
     assert random_effects([1.0, 1.01], [0.2, 0.2]).between == pytest.approx(0.0, abs=1e-3)
 
 
-def test_the_next_unit_lies_where_it_is_said_to():
+@pytest.mark.parametrize("between", [0.2, 0.4, 1.0])
+@pytest.mark.parametrize("count", [2, 6])
+def test_the_next_unit_lies_where_it_is_said_to(count: int, between: float):
+    """Of six units that differ as their errors do 80 % did where the likeliest deviation alone counts."""
     rng = np.random.default_rng(4)
     inside = 0
     for _ in range(400):
-        units = 3.0 + 0.5 * rng.normal(size=7)
-        low, high = random_effects(units[:6] + 0.2 * rng.normal(size=6), np.full(6, 0.2)).next_value()
-        inside += low <= units[6] <= high
-    assert 0.85 < inside / 400 < 0.96
+        units = 3.0 + between * rng.normal(size=count + 1)
+        errors = rng.uniform(0.1, 0.4, count)
+        low, high = next_value(units[:-1] + errors * rng.normal(size=count), errors)
+        inside += low <= units[-1] <= high
+    assert 0.85 < inside / 400 < 0.985
+
+
+def test_the_next_unit_of_values_without_errors_is_as_one_of_a_normal_distribution():
+    x = np.array([1.0, 2.0, 4.0])
+    reach = stats.t.ppf(0.95, 2) * x.std(ddof=1) * np.sqrt(1.0 + 1.0 / 3.0)
+    assert next_value(x, np.zeros(3)) == pytest.approx((x.mean() - reach, x.mean() + reach))
+    # Nearly so of small errors and many values.
+    x = np.random.default_rng(1).normal(size=400)
+    reach = stats.t.ppf(0.95, 399) * x.std(ddof=1) * np.sqrt(1.0 + 1.0 / 400.0)
+    assert next_value(x, np.full(400, 1e-3)) == pytest.approx((x.mean() - reach, x.mean() + reach), rel=0.02)
 
 
 @pytest.mark.parametrize("count", [3, 10])
