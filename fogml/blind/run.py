@@ -85,6 +85,8 @@ class RunPlan:
         i, n = self.shard
         if not 1 <= i <= n:
             raise InputError(f"shard {i}/{n}: write i/n with i from 1 to n")
+        if self.name is not None and (self.name in ("", "..") or Path(self.name).name != self.name):
+            raise InputError(f"--name {self.name}: the name of a folder was expected, no path")
         if self.workers < 1 or self.threads < 1 or not self.limit_s > 0:
             raise InputError("workers, threads and the time limit must be positive")
 

@@ -188,6 +188,12 @@ def test_shards_share_the_cases(folder: BlindFolder) -> None:
         RunPlan(folder, "abstain", shard=(5, 4))
 
 
+@pytest.mark.parametrize("name", ["", ".", "..", "../other", "a/b", "/tmp/x"])
+def test_answers_lie_in_the_suite_whatever_they_are_called(folder: BlindFolder, name: str) -> None:
+    with pytest.raises(InputError, match="no path"):
+        RunPlan(folder, "abstain", name=name)
+
+
 def test_a_truth_among_readable_folders_is_refused(folder: BlindFolder) -> None:
     check_out_of_reach(RunPlan(folder, "abstain"))
     with pytest.raises(InputError, match="move the suite"):
