@@ -16,7 +16,7 @@ from typing import Any
 
 import fogml
 from fogml.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files, read_json
-from fogml.blind.methods import ORACLE, code_state
+from fogml.blind.methods import ORACLE, code_state, load_method
 from fogml.blind.pool import Worker, WorkerLost
 from fogml.blind.worker import own_roots, within
 from fogml.errors import InputError
@@ -143,6 +143,8 @@ def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int
     InputError
         If a sealed process could read the truth where it lies, or the method does not load.
     """
+    if ":" not in plan.method:
+        load_method(plan.method)  # a name that is not known is told before any process begins
     check_out_of_reach(plan)
     left = plan.left()
     waiting: queue.SimpleQueue[str] = queue.SimpleQueue()

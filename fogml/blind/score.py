@@ -47,7 +47,7 @@ def gather(
     Raises
     ------
     InputError
-        If the truth changed since it was hashed, cases and truths don't match, there are no answers,
+        If the truth changed since it was hashed, cases and truths don't match, a method has no answers,
         one is to other files than its case holds, or a final seed is used without the ledger.
     """
     names = folder.names()
@@ -62,6 +62,11 @@ def gather(
     methods = folder.methods() if methods is None else methods
     if not methods:
         raise InputError(f"{folder.path}: holds no answers; run a method first (fogml blind run)")
+    for method in methods:
+        if not folder.answers(method).is_dir():
+            others = folder.methods()
+            which = f", or score what is there: {known_are(method, others, 'answered')}" if others else ""
+            raise InputError(f"{folder.answers(method)}: no such folder; run the method first{which}")
     return Marks(
         seed=seeds[0],
         sample_s=tuple(sorted({truth.sample_s for truth in truths})),

@@ -207,6 +207,11 @@ def test_a_method_that_does_not_load_is_said_at_once(folder: BlindFolder) -> Non
         run_cases(RunPlan(folder, "nowhere:nothing"))
 
 
+def test_a_name_of_no_method_is_said_as_such(folder: BlindFolder) -> None:
+    with pytest.raises(InputError, match=r"^no method 'diagnosi'; .*did you mean 'diagnosis'"):
+        run_cases(RunPlan(folder, "diagnosi"))
+
+
 def test_the_cost_of_a_false_name_is_asked_of_the_diagnosis_alone(folder: BlindFolder) -> None:
     settings = RunSettings(directory=str(folder.path), methods=["abstain"], cost_of_false_name=3.0)
     with pytest.raises(InputError, match="no method but 'diagnosis' takes it"):

@@ -98,6 +98,11 @@ def test_left_out_is_not_offered(suite: BlindFolder) -> None:
     assert "thermal_hysteresis" not in named(answer(suite, "bic", "0003"))
 
 
+def test_a_method_without_answers_is_no_failed_one(suite: BlindFolder) -> None:
+    with pytest.raises(InputError, match=r"answers-abstein: no such folder.* did you mean 'abstain'\?"):
+        gather(suite, ["abstein"])
+
+
 def test_oracle_tells_the_known_from_the_unknown(suite: BlindFolder) -> None:
     assert answer(suite, "oracle", "0001")["verdict"] == "no_gap"
     assert named(answer(suite, "oracle", "0002")) == ["thermal_hysteresis"]
