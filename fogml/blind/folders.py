@@ -90,7 +90,8 @@ class BlindFolder:
         InputError
             If there are none.
         """
-        found = sorted(p.name for p in self.cases.glob("[0-9]*") if p.is_dir() and p.name.isdigit())
+        found = [p.name for p in self.cases.glob("[0-9]*") if p.is_dir() and p.name.isdecimal()]
+        found.sort(key=lambda name: (len(name), name))  # past 9999 names are longer
         if not found:
             raise InputError(f"{self.cases}: holds no cases; make them first (fogml blind make)")
         return tuple(found)

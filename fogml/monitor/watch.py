@@ -182,7 +182,7 @@ def watch(
         Least mean number of a unit's runs until a false alarm.
     bias_limit
         Change of the level that asks for a calibration [deg/h]; by default half the width of the model's
-        90 % interval.
+        90 % interval inside training.
     prior
         What is taken for granted of changes.
     """
@@ -237,6 +237,8 @@ def _watched(
             + ("the change" if chart.changes else "the first")
             + ": no change can be told yet"
         )
+    # Of a run outside training the interval is wider than the model states it.
+    limit = bias_limit or min(record.half_width for record in records)
     return UnitWatch(
         unit=last.unit,
         axis=last.axis,
@@ -245,9 +247,7 @@ def _watched(
         dated=dated,
         chart=chart,
         state=state,
-        calibration=_calibration(
-            age[first:], figures["level"][first:], bias_limit or last.half_width, any(prior.wander)
-        )
+        calibration=_calibration(age[first:], figures["level"][first:], limit, any(prior.wander))
         if dated
         else None,
         notes=tuple(notes),

@@ -123,6 +123,12 @@ def test_runs_given_again_with_a_new_model_are_those_of_the_new(key):
     assert {r.model for r in unit.records} == {"new"} and len(unit.records) == 8
 
 
+def test_a_last_run_outside_training_widens_no_limit():
+    records = service(12)
+    (unit,) = watch([*records[:-1], replace(records[-1], half_width=5.0)])
+    assert unit.calibration.limit == records[0].half_width
+
+
 def test_runs_that_tell_no_bias_are_left_out_of_the_calibration():
     records = service(12)
     gone = [
