@@ -104,7 +104,7 @@ def variances_sf(ratio: float, above: int, below: float) -> float:
     return float(chi2_sf(ratio * above, above) if np.isinf(below) else fdtrc(above, below, ratio))
 
 
-def variances_isf(probability: float, above: int, below: int) -> float:
+def variances_isf(probability: float, above: int, below: float) -> float:
     """Value over which a ratio of two mean squares lies with a probability (F)."""
     from scipy.special import fdtri
 

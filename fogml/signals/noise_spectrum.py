@@ -17,7 +17,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.signals import large
 from fogml.signals.cosine import cosine_transform
-from fogml.signals.distributions import chi2_isf, chi2_ppf
+from fogml.signals.distributions import chi2_isf, chi2_ppf, variances_isf
 
 Rows = Callable[[slice], FloatArray]
 """Columns of a stretch, told for some of its rows at a time."""
@@ -27,6 +27,10 @@ POINTS = 4
 _BLOCKS = 4096
 _ROUNDING = 1e-12
 """A column moves by rounding alone if it is nearer than this, relative to its size, to its mean."""
+_NEAR = 50
+"""Coefficients on either side whose median a line's are compared with."""
+_TOLD = 0.37
+"""Degrees of freedom of a median of squares, per square: twice their median's share in its variance."""
 _LONG = 1 << 16
 """Samples from which a series may lose a few at its end so that its transform is quick."""
 
@@ -302,8 +306,9 @@ def _lines(
             masked = np.zeros(len(square), dtype=np.bool_)
         for place in low + np.flatnonzero(part > limit * level):
             # A density that is steep or has zeros is no line: its neighbours are as large.
-            near = square[max(place - 24, 0) : place + 25]
-            if masked[place] or square[place] <= limit * float(np.median(near)) / typical:
+            near = square[max(place - _NEAR, 0) : place + _NEAR + 1]
+            least = variances_isf(chance, 1, _TOLD * len(near)) * float(np.median(near)) / typical
+            if masked[place] or square[place] <= least:
                 continue
             a = b = int(place)
             # Every other coefficient of a line may be small: two quiet ones end it.

@@ -207,6 +207,13 @@ def test_a_sinusoid_is_told_apart_and_noise_of_another_kind_widens_the_intervals
     assert widths[1] > 2 * widths[0]
 
 
+def test_noise_is_hardly_ever_taken_for_a_line():
+    """By chance one of a thousand runs; as if medians of a few squares were known it were ten."""
+    rng = np.random.default_rng(8)
+    found = [len(spectrum_of([rng.normal(size=2000)], 1.0).lines) for _ in range(1500)]
+    assert sum(map(bool, found)) <= 5
+
+
 def test_the_fitted_curve_is_the_sum_of_its_terms():
     got = fits(5, 1, 20_000, N=0.01, K=3.0)[0]
     taus = np.array([0.4, 5.0, 300.0])
