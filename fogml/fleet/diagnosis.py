@@ -41,15 +41,11 @@ class LineRules:
         A cause is the line's if more than half of its units have it with this probability; by lot likewise.
     rare
         A cause is rare where no more than this share of the units, or one alone, have it.
-    before
-        Probability before the data that a unit has a given cause, as a diagnosis takes it: one of the
-        catalogue's 60 that runs can show.
     """
 
     false_share: float = 0.05
     shared: float = 0.95
     rare: float = 0.1
-    before: float = 1.0 / 60.0
 
 
 RULES = LineRules()
@@ -57,11 +53,12 @@ RULES = LineRules()
 
 
 class Cause(Strict, extra="ignore"):
-    """A cause of a unit's gap, as its diagnosis tells it."""
+    """A cause of a unit's gap, as its diagnosis tells it; `prior_probability` is that before the data."""
 
     effect: str
     members: list[str]
     probability: Probability
+    prior_probability: Annotated[float, Field(gt=0.0, lt=1.0)]
     share: float | None
     place: str
     amplitude: float
@@ -96,6 +93,7 @@ def unit_diagnosis(found: Any, covariates: Mapping[str, str]) -> dict[str, Any]:
                 effect=one.effect,
                 members=list(one.members),
                 probability=float(one.probability),
+                prior_probability=float(one.prior_probability),
                 share=None if one.share is None else float(one.share),
                 place=one.place,
                 amplitude=float(one.amplitude.value),
@@ -167,8 +165,10 @@ def _probability(unit: UnitDiagnosis, effect: str) -> float:
     return cause.probability if cause is not None else 0.0
 
 
-def _factor(unit: UnitDiagnosis, effect: str, rules: LineRules) -> float:
-    return bayes_factor(_probability(unit, effect), rules.before)
+def _factor(unit: UnitDiagnosis, effect: str) -> float:
+    """Of a cause that a unit's diagnosis does not list, none."""
+    cause = _of(unit, effect)
+    return 0.0 if cause is None else bayes_factor(cause.probability, cause.prior_probability)
 
 
 def _cause(
@@ -177,7 +177,7 @@ def _cause(
     """One cause on the line."""
     # Units whose runs could not show it say nothing on how common it is.
     showing = [unit for unit in units if effect not in unit.undetectable or _of(unit, effect) is not None]
-    common = prevalence([_factor(unit, effect, rules) for unit in showing])
+    common = prevalence([_factor(unit, effect) for unit in showing])
     named = [(label, cause) for label, unit in zip(labels, units) if (cause := _of(unit, effect)) is not None]
     sure = [(label, cause) for label, cause in named if cause.probability >= NAMED]
     by_size = sorted(named, key=lambda item: -item[1].probability)
@@ -224,7 +224,7 @@ def _depends(effect: str, units: Sequence[UnitDiagnosis], rules: LineRules) -> l
         groups: dict[str, list[float]] = defaultdict(list)
         for unit in units:
             if name in unit.covariates:
-                groups[unit.covariates[name]].append(_factor(unit, effect, rules))
+                groups[unit.covariates[name]].append(_factor(unit, effect))
         # Where every unit has a value of its own there is nothing to compare.
         if not 2 <= len(groups) <= sum(map(len, groups.values())) / 2:
             continue

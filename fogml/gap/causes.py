@@ -33,6 +33,7 @@ def found_cause(
         stage=declared.stage,
         members=cause.ids,
         probability=probability,
+        prior_probability=found.search.prior_probability(cause.ids),
         amplitude=Estimate(card.lacking, card.amplitude_se, declared.amplitude.unit),
         parameters={
             q.name: Estimate(card.value.shape[q.name], card.shape_se.get(q.name, 0.0), q.unit)

@@ -61,6 +61,8 @@ class Found:
         Ids that these runs can't tell from it, itself included.
     probability
         That one of the members acts.
+    prior_probability
+        The same before the data: the more causes these runs can tell, the less likely each of them.
     amplitude
         In the card's unit; its standard error holds what the true form may differ by.
     parameters
@@ -90,6 +92,7 @@ class Found:
     stage: str
     members: tuple[str, ...]
     probability: float
+    prior_probability: float
     amplitude: Estimate
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     by_run: tuple[RunAmplitude, ...] = ()

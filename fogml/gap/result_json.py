@@ -50,7 +50,7 @@ def gap_values(found: Diagnosis) -> dict[str, Any]:
 
 def _found(found: Found) -> dict[str, Any]:
     odds = ("against_unknown", "among_known", "log_share")
-    same = ("probability", "amplitude", "parameters", "stage", "by_run", "consistent")
+    same = ("probability", "prior_probability", "amplitude", "parameters", "stage", "by_run", "consistent")
     return {
         "effect": found.effect,
         "class": list(found.members),

@@ -290,6 +290,11 @@ class Search:
         across = solve_triangular(held.factor, held.size[:, None] * rows, lower=True, check_finite=False)
         return across, self._fits[span] - across.T @ held.along
 
+    def prior_probability(self, ids: Sequence[str]) -> float:
+        """That one of these candidates acts, before the data."""
+        odds = [x for f, x in zip(self.families, self.log_odds) if f.kind == "known" and f.id in ids]
+        return min(float(np.sum(1.0 / (1.0 + np.exp(-np.array(odds))))), 0.5)
+
     def _log_odds(self) -> FloatArray:
         kinds = ("known", "unknown", "plant", "left_out")
         count = {kind: sum(f.kind == kind for f in self.families) for kind in kinds}

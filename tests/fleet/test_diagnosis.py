@@ -14,11 +14,14 @@ from fogml.report.fleet_page import fleet_page
 from tests.report.diagnoses import diagnosis
 
 
-def cause(effect: str, probability: float, size: float, share: float = 0.6) -> dict[str, Any]:
+def cause(
+    effect: str, probability: float, size: float, share: float = 0.6, prior: float = 1.0 / 30.0
+) -> dict[str, Any]:
     told = {
         "effect": effect,
         "members": [effect],
         "probability": probability,
+        "prior_probability": prior,
         "share": share,
         "place": "coil",
     }
@@ -45,6 +48,21 @@ def line() -> dict[str, Any]:
             causes.append(cause("ageing", 0.9, 0.3, share=0.1))
         units.append(unit(*causes, lot="B" if place % 4 == 0 else "A", hidden=("radiation",)))
     return line_diagnosis([f"FOG-{place}" for place in range(40)], units)
+
+
+def test_how_common_a_cause_is_follows_from_the_data_whatever_a_diagnosis_took_before_them() -> None:
+    """Likelihood ratios of normal data, by Bayes with one prior or another; the share is the data's."""
+    rng = np.random.default_rng(3)
+    has = rng.random(60) < 0.4
+    ratio = np.exp(2.0 * rng.normal(loc=2.0 * has) - 2.0)
+    shares = []
+    for prior in (0.02, 0.05):
+        probability = prior * ratio / (prior * ratio + 1.0 - prior)
+        units = [unit(cause("loop_gain", float(p), 1.0, prior=prior)) for p in probability]
+        told = line_diagnosis([str(i) for i in range(60)], units)["causes"][0]
+        shares.append((told["prevalence"], *told["prevalence_ci90"]))
+    assert shares[0] == pytest.approx(shares[1], rel=1e-9)
+    assert shares[0][1] < 0.4 < shares[0][2]
 
 
 def test_what_the_line_shares_and_what_to_change_first(line: dict[str, Any]) -> None:

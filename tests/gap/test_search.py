@@ -40,6 +40,14 @@ def test_evidence_by_inner_products_is_that_of_the_data(found):
         assert held == pytest.approx(search.field.beside(explanation.members).log_evidence, rel=1e-9)
 
 
+def test_candidates_share_what_is_expected_before_the_data(found):
+    known = [f.id for f in found.columns.families if f.kind == "known"]
+    search, expected = found.search, found.setting.priors.expected_causes
+    assert search.prior_probability(known[:1]) == pytest.approx(expected / len(known))
+    assert search.prior_probability(known[:3]) == pytest.approx(3 * expected / len(known))
+    assert search.prior_probability(["nothing_of_the_kind"]) == 0.0
+
+
 def test_what_stands_in_for_a_name_has_none_of_its_class(found):
     best = found.explanations[0]
     names = found.search.names(best)

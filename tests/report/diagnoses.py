@@ -71,6 +71,7 @@ def hysteresis(members: tuple[str, ...] = ("thermal_hysteresis",), **changes: An
         "stage": "bias",
         "members": members,
         "probability": 0.972,
+        "prior_probability": 0.03 * len(members),
         "amplitude": Estimate(0.0214, 0.0011, "deg/h"),
         "parameters": {"half_width": Estimate(9.12, 0.43, "degC")},
         "by_run": (RunAmplitude("a.csv", 0.0221, 0.0015), RunAmplitude("b.csv", 0.0206, 0.0017)),

@@ -29,6 +29,7 @@ def diagnosed(place: int) -> dict[str, Any]:
         "effect": "thermal_hysteresis",
         "members": ["thermal_hysteresis"],
         "probability": 0.9,
+        "prior_probability": 0.03,
         "share": 0.7,
         "place": "coil",
         "amplitude": 0.02 * (5.0 if place == 8 else 1.0) + 0.001 * rng.normal(),
