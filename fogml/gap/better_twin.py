@@ -40,7 +40,7 @@ def counterfactuals(found: Inference, fit: Fit, named: Sequence[Cause]) -> tuple
         courses = [c for c in _courses(found, fit.foretold, named, sizes, i) if np.isfinite(c.values).all()]
         acting = np.sum([c.values for c in courses if c.acts], axis=0) if courses else 0.0
         # What is replayed in all, less what acts: the twin's own effects are part of its replay.
-        whole = rows.recorded - rows.gap + fit.foretold.on(i)
+        whole = rows.recorded - fit.foretold.left_on(i)
         floor = float(floor_square(found.field.whitening.noise, windows.time, windows.window_s)) ** 0.5
         averaged = [replace(c, values=windows.of(c.values)) for c in courses]
         least = settings.shown_share * floor
