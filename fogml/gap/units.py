@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.gap.cards import in_form, replaced
 from fogml.gap.diagnosis import answered, inferred
 from fogml.gap.inference import Inference, Progress
 from fogml.gap.model import AnyModel
@@ -227,19 +228,29 @@ def _shared(by_unit: dict[str, Diagnosis], told: Sequence[_Told]) -> tuple[Share
         if probability < priors.reported.listed or not sizes:
             continue
         unit = next(iter(sizes.values())).unit
-        causes.append(SharedCause(id, probability, sizes, *_going_over(sizes, unit), unit))
+        going_over = _going_over(sizes, unit, _possible(told[0].found, id))
+        causes.append(SharedCause(id, probability, sizes, *going_over, unit))
     return tuple(sorted(causes, key=lambda c: -c.probability))
 
 
+def _possible(found: Inference, id: str) -> tuple[float, float]:
+    """Sizes that an effect may have beyond what the model has of it; what each run draws is a deviation."""
+    declared = found.scene.candidates[id]
+    low, high = declared.amplitude.limits
+    had = sum(setting.amplitude for _, setting in replaced(found, [id]))
+    return (low if in_form(declared) else 0.0) - had, high - had
+
+
 def _going_over(
-    sizes: dict[str, Estimate], unit: str
+    sizes: dict[str, Estimate], unit: str, possible: tuple[float, float]
 ) -> tuple[Estimate | None, float | None, tuple[float, float] | None]:
     """Mean, spread from unit to unit, and where the next unit's size lies; None of one unit."""
     if len(sizes) < 2:
         return None, None, None
     told = [s.value for s in sizes.values()], [s.se for s in sizes.values()]
     held = random_effects(*told)
-    return Estimate(held.mean, held.se, unit), held.between, next_value(*told)
+    low, high = np.clip(next_value(*told), *possible).tolist()
+    return Estimate(held.mean, held.se, unit), held.between, (low, high)
 
 
 def _prior(told: Sequence[_Told], names: frozenset[str]) -> float:

@@ -1,13 +1,19 @@
 """Several units: causes shared, sizes each unit's own, what the next unit may have."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from fogml.errors import InputError
 from fogml.gap import units
 from fogml.gap.diagnosis import diagnose
 from fogml.gap.model import EffectValue
+from fogml.gap.result import Estimate
 from fogml.gap.units import diagnose_units
 from fogml.runs.facts import Facts
+from fogml.signals.restricted import next_value
+from fogml.twin.registry import effect
+from fogml.twin.twin import EffectSetting
 
 from .test_own_simulator import Simulator, made_runs
 
@@ -64,3 +70,20 @@ def test_a_unit_whose_runs_cannot_show_a_cause_says_nothing_of_it():
     (alone,) = diagnose_units(model, quiet).shared
     assert found.shared[0].probability == pytest.approx(alone.probability, rel=1e-6)
     assert not [f for f in found.by_unit["B"].named if f.effect == "bend"]
+
+
+def test_the_next_units_size_is_a_possible_one():
+    """A deviation over runs is none below nought, a dead zone neither, but it may be less than a twin's."""
+    candidates = {id: effect(id) for id in ("turn_on_bias", "deadband", "thermal_hysteresis")}
+    has = [(candidates["deadband"], EffectSetting(0.2))]
+    sizes = {"A": Estimate(0.1, 0.2, "deg/h"), "B": Estimate(0.3, 0.2, "deg/h")}
+    free = next_value([0.1, 0.3], [0.2, 0.2])
+    assert free[0] < -0.2
+    for on, id, least in (
+        ([], "turn_on_bias", 0.0),
+        (has, "deadband", -0.2),
+        ([], "thermal_hysteresis", free[0]),
+    ):
+        found = SimpleNamespace(scene=SimpleNamespace(candidates=candidates), plant=SimpleNamespace(on=on))
+        _, _, (low, high) = units._going_over(sizes, "deg/h", units._possible(found, id))
+        assert (low, high) == pytest.approx((least, free[1]))
