@@ -13,7 +13,7 @@ from fogml.blind.frame.record import World
 
 
 def duhem(x: FloatArray, quickness: float, knee: float, past: Sequence[float] = ()) -> FloatArray:
-    """Coleman and Hodgdon's loop: dz = a |dx| (tanh(x / knee) - z) about the path's middle; shape (n,).
+    """Coleman and Hodgdon's loop: dz = a |dx| (tanh(x / knee) - z) about 20 degC; shape (n,).
 
     Exact for each step with the anhysteretic curve taken at its middle.
     """
