@@ -126,7 +126,11 @@ class OutputFilter:
     def corner_cycles(self, log_corner: float) -> float | None:
         """Frequency of half power in cycles per sample; None where all that is sampled passes."""
         if self.kind == "mean":
-            return 0.443 / self.order
+            from scipy.optimize import brentq
+
+            # Its first zero is at one over the order.
+            first = np.array([1e-9, 1.0]) / self.order
+            return float(brentq(lambda x: self.response(x, log_corner)[0] - 0.5, *first))
         if not self.free:
             return None
         corner = float(np.exp(log_corner))

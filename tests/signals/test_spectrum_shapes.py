@@ -22,6 +22,16 @@ def test_half_the_power_passes_at_the_corner(low_pass: OutputFilter) -> None:
     assert slope[0] == pytest.approx((more - less) / 2e-5, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("order", "corner"), [(2, 0.25), (3, np.arccos((3 / np.sqrt(2) - 1) / 2) / (2 * np.pi))]
+)
+def test_half_the_power_passes_a_running_mean_at_its_corner(order: int, corner: float) -> None:
+    """Of two samples the amplitude is cos(pi x), of three (1 + 2 cos(2 pi x)) / 3."""
+    assert OutputFilter("mean", order).corner_cycles(0.0) == pytest.approx(corner)
+    # Of many it is that of a continuous mean.
+    assert OutputFilter("mean", 100).corner_cycles(0.0) == pytest.approx(0.44295 / 100, rel=1e-4)
+
+
 @pytest.mark.parametrize("sample_s", [0.01, 1.0])
 @pytest.mark.parametrize("samples", [0.5, 3.0, 50.0, 1e5])
 def test_what_is_correlated_is_the_sum_of_what_folds_back(sample_s: float, samples: float) -> None:
