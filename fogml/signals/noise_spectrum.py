@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray, IntArray
+from fogml.arrays import BoolArray, FloatArray
 from fogml.signals import large
 from fogml.signals.cosine import cosine_transform
-from fogml.signals.distributions import chi2_isf, chi2_ppf, variances_isf
+from fogml.signals.spectral_lines import SpectralLine, lines_of, one_of_each
 
 Rows = Callable[[slice], FloatArray]
 """Columns of a stretch, told for some of its rows at a time."""
@@ -27,10 +26,6 @@ POINTS = 4
 _BLOCKS = 4096
 _ROUNDING = 1e-12
 """A column moves by rounding alone if it is nearer than this, relative to its size, to its mean."""
-_NEAR = 50
-"""Coefficients on either side whose median a line's are compared with."""
-_TOLD = 0.37
-"""Degrees of freedom of a median of squares, per square: twice their median's share in its variance."""
 _LONG = 1 << 16
 """Samples from which a series may lose a few at its end so that its transform is quick."""
 
@@ -63,14 +58,6 @@ class Resolution:
 
 
 @dataclass(frozen=True)
-class SpectralLine:
-    """A sinusoid in the data: frequency [Hz] and amplitude, in the unit of the data."""
-
-    frequency_hz: float
-    amplitude: float
-
-
-@dataclass(frozen=True)
 class Spectrum:
     """Estimated one-sided density of a series, row by row, with rising frequency in two parts.
 
@@ -91,7 +78,7 @@ class Spectrum:
     removed
         Constants of the columns that were taken out beforehand by ordinary least squares, shape (p,).
     lines
-        Sinusoids whose coefficients are left out.
+        Sinusoids whose coefficients are left out, the largest first.
     collinear
         As of `Resolution`.
     """
@@ -158,7 +145,8 @@ def spectrum_of(
     edges = _edges((single + 0.5) / longest, fine.per_octave)
     sums = np.zeros(len(edges) - 1)
     counts = np.zeros(len(edges) - 1)
-    low_f, low_v, low_x, lines = [], [], [], []
+    low_f, low_v, low_x = [], [], []
+    lines: list[tuple[int, list[SpectralLine]]] = []
     for i, n, (x, means, _) in zip(kept, lengths, coarse):
         y, middle = large.empty(n), means.mean()
         for part in large.pieces(y):
@@ -181,8 +169,8 @@ def spectrum_of(
         first = at[used]
         if not len(used):
             continue
-        masked, found = _lines(square, at, sample_s, n, alone + 1, fine.line_chance / total)
-        lines += found
+        masked, found = lines_of(square, at, sample_s, n, alone + 1, fine.line_chance / total)
+        lines.append((n, found))
         if masked is not None:
             square[masked] = 0.0
             lost = np.searchsorted(at, np.flatnonzero(masked), side="right") - 1
@@ -206,7 +194,7 @@ def spectrum_of(
         values,
         np.vstack(low_x),
         removed,
-        tuple(sorted(lines, key=lambda line: -line.amplitude)),
+        one_of_each(lines, sample_s),
         fine.collinear,
     )
 
@@ -280,48 +268,3 @@ def _edges(begin: float, per_octave: int) -> FloatArray:
     octaves = -np.log2(2.0 * begin)
     low = begin * 2.0 ** np.linspace(0.0, octaves, max(int(np.ceil(per_octave * octaves)), 1) + 1)
     return np.concatenate((low, 1.0 - low[-2::-1]))
-
-
-def _lines(
-    square: FloatArray, edges: IntArray, sample_s: float, n: int, offset: int, chance: float
-) -> tuple[BoolArray | None, list[SpectralLine]]:
-    """Coefficients of sinusoids that stand out of their bins' noise, and what they are."""
-    # Median and limit of a squared normal value.
-    typical, limit = float(chi2_ppf(0.5, 1)), float(chi2_isf(chance, 1))
-    masked: BoolArray | None = None
-    lines: list[SpectralLine] = []
-    for low, high in pairwise(edges.tolist()):
-        # A median of few, or of one side of a line, says nothing.
-        if high - low < 32:
-            continue
-        part = square[low:high]
-        top = int(np.argmax(part))
-        peak = float(part[top])
-        if peak <= limit * float(part.mean()) * 0.1:
-            continue
-        level = float(np.median(part)) / typical
-        if level <= 0.0 or peak <= limit * level:
-            continue
-        if masked is None:
-            masked = np.zeros(len(square), dtype=np.bool_)
-        for place in low + np.flatnonzero(part > limit * level):
-            # A density that is steep or has zeros is no line: its neighbours are as large.
-            near = square[max(place - _NEAR, 0) : place + _NEAR + 1]
-            least = variances_isf(chance, 1, _TOLD * len(near)) * float(np.median(near)) / typical
-            if masked[place] or square[place] <= least:
-                continue
-            a = b = int(place)
-            # Every other coefficient of a line may be small: two quiet ones end it.
-            while a > 0 and max(square[a - 1], square[max(a - 2, 0)]) > 4.0 * level:
-                a -= 1
-            while (
-                b < len(square) - 1 and max(square[b + 1], square[min(b + 2, len(square) - 1)]) > 4.0 * level
-            ):
-                b += 1
-            masked[a : b + 1] = True
-            energy = square[a : b + 1] - level
-            weight = np.maximum(energy, 0.0)
-            middle = float(np.average(np.arange(a, b + 1), weights=weight))
-            frequency = (offset + middle) / (2.0 * n * sample_s)
-            lines.append(SpectralLine(frequency, float(np.sqrt(max(energy.sum(), 0.0) / (sample_s * n)))))
-    return masked, lines

@@ -207,6 +207,16 @@ def test_a_sinusoid_is_told_apart_and_noise_of_another_kind_widens_the_intervals
     assert widths[1] > 2 * widths[0]
 
 
+def test_a_sinusoid_in_several_stretches_is_one():
+    rng, time = np.random.default_rng(9), np.arange(20_000)
+    rate = (
+        rng.normal(size=20_000) + np.sin(2 * np.pi * 0.1234567 * time) + 0.5 * np.sin(2 * np.pi * 0.2 * time)
+    )
+    lines = spectrum_of([rate[:8000], rate[8100:14_000], rate[14_500:]], 1.0).lines
+    assert [line.frequency_hz for line in lines] == pytest.approx([0.1234567, 0.2], abs=5e-5)
+    assert [line.amplitude for line in lines] == pytest.approx([1.0, 0.5], rel=0.05)
+
+
 def test_noise_is_hardly_ever_taken_for_a_line():
     """By chance one of a thousand runs; as if medians of a few squares were known it were ten."""
     rng = np.random.default_rng(8)

@@ -1,0 +1,115 @@
+"""Sinusoids in a series: coefficients of its cosine transform that stand out of the noise about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from fogml.arrays import BoolArray, FloatArray, IntArray
+from fogml.signals.distributions import chi2_isf, chi2_ppf, variances_isf
+
+_NEAR = 50
+"""Coefficients on either side whose median a line's are compared with."""
+_TOLD = 0.37
+"""Degrees of freedom of a median of squares, per square: twice their median's share in its variance."""
+
+
+@dataclass(frozen=True)
+class SpectralLine:
+    """A sinusoid in the data: frequency [Hz] and amplitude, in the unit of the data."""
+
+    frequency_hz: float
+    amplitude: float
+
+
+def lines_of(
+    square: FloatArray, edges: IntArray, sample_s: float, n: int, offset: int, chance: float
+) -> tuple[BoolArray | None, list[SpectralLine]]:
+    """Coefficients of sinusoids that stand out of their bins' noise, and what they are.
+
+    Parameters
+    ----------
+    square
+        Squared coefficients of a stretch of n samples, from number `offset` on, as a one-sided density.
+    edges
+        Of the bins, as places in them.
+    sample_s
+        Sample interval [s].
+    n, offset
+        Samples of the stretch, and the number of the first coefficient.
+    chance
+        Of taking a coefficient of noise for a line.
+
+    Returns
+    -------
+    masked, lines
+        Which coefficients are a line's, None where there are none, and the lines.
+    """
+    # Median and limit of a squared normal value.
+    typical, limit = float(chi2_ppf(0.5, 1)), float(chi2_isf(chance, 1))
+    masked: BoolArray | None = None
+    lines: list[SpectralLine] = []
+    for low, high in pairwise(edges.tolist()):
+        # A median of few, or of one side of a line, says nothing.
+        if high - low < 32:
+            continue
+        part = square[low:high]
+        top = int(np.argmax(part))
+        peak = float(part[top])
+        if peak <= limit * float(part.mean()) * 0.1:
+            continue
+        level = float(np.median(part)) / typical
+        if level <= 0.0 or peak <= limit * level:
+            continue
+        if masked is None:
+            masked = np.zeros(len(square), dtype=np.bool_)
+        for place in low + np.flatnonzero(part > limit * level):
+            # A density that is steep or has zeros is no line: its neighbours are as large.
+            near = square[max(place - _NEAR, 0) : place + _NEAR + 1]
+            least = variances_isf(chance, 1, _TOLD * len(near)) * float(np.median(near)) / typical
+            if masked[place] or square[place] <= least:
+                continue
+            a = b = int(place)
+            # Every other coefficient of a line may be small: two quiet ones end it.
+            while a > 0 and max(square[a - 1], square[max(a - 2, 0)]) > 4.0 * level:
+                a -= 1
+            while (
+                b < len(square) - 1 and max(square[b + 1], square[min(b + 2, len(square) - 1)]) > 4.0 * level
+            ):
+                b += 1
+            masked[a : b + 1] = True
+            energy = square[a : b + 1] - level
+            weight = np.maximum(energy, 0.0)
+            middle = float(np.average(np.arange(a, b + 1), weights=weight))
+            frequency = (offset + middle) / (2.0 * n * sample_s)
+            lines.append(SpectralLine(frequency, float(np.sqrt(max(energy.sum(), 0.0) / (sample_s * n)))))
+    return masked, lines
+
+
+def one_of_each(
+    found: Sequence[tuple[int, Sequence[SpectralLine]]], sample_s: float
+) -> tuple[SpectralLine, ...]:
+    """Lines of stretches of so many samples, each once, the largest first.
+
+    A stretch tells a frequency to one over its length: the nearest within is the same line. It has the mean
+    frequency, and the mean power, of the stretches that show it, by their lengths.
+    """
+    lines: list[list[tuple[int, SpectralLine]]] = []
+    for n, of_one in sorted(found, key=lambda stretch: -stretch[0]):
+        known = lines[:]
+        for line in of_one:
+            off = [abs(seen[0][1].frequency_hz - line.frequency_hz) * n * sample_s for seen in known]
+            if off and min(off) <= 1.0:
+                known[int(np.argmin(off))].append((n, line))
+            else:
+                lines.append([(n, line)])
+    merged = []
+    for seen in lines:
+        lengths = [n for n, _ in seen]
+        frequency = np.average([line.frequency_hz for _, line in seen], weights=lengths)
+        power = np.average([line.amplitude**2 for _, line in seen], weights=lengths)
+        merged.append(SpectralLine(float(frequency), float(np.sqrt(power))))
+    return tuple(sorted(merged, key=lambda line: -line.amplitude))
