@@ -258,20 +258,31 @@ FAMILIES: dict[str, Build] = {
 def families_of(twin: Twin, scene: Scene, without: Iterable[str] = ()) -> tuple[Family, ...]:
     """Families of everything that may act on these runs.
 
-    `twin` tells how sensors usually read. Effects that the twin has are among them: their sizes may be wrong.
+    `twin` tells how sensors usually read. Effects that the twin has are among them: their sizes may be wrong,
+    and too large as well as too small.
     """
     left_out = set(without)
+
+    def build_of(declared: Effect) -> Build:
+        build = FAMILIES.get(declared.family) or signature_of(declared)
+        return partial(_of_either_sign, build) if declared.id in twin.settings else build
+
     known = [
         Family(
             id,
             "left_out" if id in left_out else "known",
-            FAMILIES.get(declared.family) or signature_of(declared),
+            build_of(declared),
             drawn_per_run=declared.drawn_per_run or declared.family == "line",
         )
         for id, declared in scene.candidates.items()
         if _can_show(declared, scene, twin)
     ]
     return (*known, *unknown_families(scene.grids), Family("other_plant", "plant", other_plant))
+
+
+def _of_either_sign(build: Build, rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+    """What corrects an effect that is there."""
+    return (block._replace(positive=False) for block in build(rows, scene, constants))
 
 
 def _can_show(declared: Effect, scene: Scene, twin: Twin) -> bool:

@@ -179,18 +179,23 @@ class Group:
     def gains(
         self, part: slice, across: FloatArray, fits: FloatArray, lengths: FloatArray, first: int = 0
     ) -> FloatArray:
-        """Gains of some of the blocks at their sizes, shape (blocks, sizes); columns begin at `first`."""
+        """Gains of some of the blocks at their sizes, and what signs add, shape (2, blocks, sizes).
+
+        Columns begin at `first`.
+        """
         at = self.places[part] - first
         beside = across.T[at]
         if self.modes is not None:
             values, vectors = (held[part] for held in self.modes)
             told = zip(values, vectors, beside, fits[at], lengths)
-            return np.array([wide_gains(*one) for one in told])
+            gains = np.array([wide_gains(*one) for one in told])
+            return np.stack([gains, np.zeros(gains.shape)])
         gram = self.grams[part] - beside @ beside.transpose(0, 2, 1) if len(across) else self.grams[part]
         gains, known = size_gains(gram, fits[at], lengths), self.positive[part]
+        signs = np.zeros(gains.shape)
         if known.any():
-            gains[known] += sign_gains(gram[known], fits[at][known], lengths[known])
-        return gains
+            signs[known] = sign_gains(gram[known], fits[at][known], lengths[known])
+        return np.stack([gains, signs])
 
 
 class Blocks:
@@ -251,23 +256,23 @@ class Blocks:
                     self._parts[f].append((group, slice(low, high)))
 
     def gains(self, across: FloatArray, fits: FloatArray) -> FloatArray:
-        """Gain in log evidence of every node at its sizes, shape (rows, sizes).
+        """Gain in log evidence of every node at its sizes, and what its sign adds, shape (2, rows, sizes).
 
         `across` are inner products with what is held beyond the constants, `fits` those with the data
         beside it, of all columns.
         """
-        out = np.empty(self.lengths.shape)
+        out = np.empty((2, *self.lengths.shape))
         for group in self._groups:
-            out[group.rows] = group.gains(slice(None), across, fits, self.lengths[group.rows])
+            out[:, group.rows] = group.gains(slice(None), across, fits, self.lengths[group.rows])
         return out
 
     def gains_of(self, f: int, across: FloatArray, fits: FloatArray, first: int = 0) -> FloatArray:
-        """The same of one family, shape (own rows, sizes); columns begin at `first`."""
+        """The same of one family, shape (2, own rows, sizes); columns begin at `first`."""
         top = self.rows[f].start
-        out = np.empty((self.rows[f].stop - top, self.lengths.shape[1]))
+        out = np.empty((2, self.rows[f].stop - top, self.lengths.shape[1]))
         for group, part in self._parts[f]:
             rows = group.rows[part]
-            out[rows - top] = group.gains(part, across, fits, self.lengths[rows], first)
+            out[:, rows - top] = group.gains(part, across, fits, self.lengths[rows], first)
         return out
 
 

@@ -27,7 +27,8 @@ class Explanation:
     log_evidence
         At one noise, members' nodes and sizes averaged over beside each other.
     spread
-        What averaging adds to the evidence at the nodes and sizes that stand for the members.
+        What averaging, and signs that physics gives, add to the evidence at the nodes and sizes that stand
+        for the members.
     by_noise
         Log evidence, with the noise's prior, at each noise.
     shared
@@ -133,7 +134,7 @@ class Search:
         return {f: gain + self.log_odds[f] for f, gain in alone.items()}
 
     def _averaged_alone(self, fits: FloatArray) -> dict[int, float]:
-        table = self.blocks.gains(np.empty((0, len(fits))), fits) + self.blocks.prior
+        table = self.blocks.gains(np.empty((0, len(fits))), fits).sum(axis=0) + self.blocks.prior
         return {f: log_sum_exp(table[rows]) for f, rows in self.blocks.rows.items()}
 
     def _fits_to(self, data: FloatArray) -> FloatArray:
@@ -144,7 +145,7 @@ class Search:
     def best_members(self, beside: Sequence[Member]) -> dict[int, Member]:
         """The node and size that stand for each family beside members."""
         gains = self.blocks.gains(*self._beside(self._held(beside)))
-        return {f: self._averaged(f, gains[rows])[0] for f, rows in self.blocks.rows.items()}
+        return {f: self._averaged(f, gains[:, rows])[0] for f, rows in self.blocks.rows.items()}
 
     def exchanged(self, explanation: Explanation, family: int) -> dict[int, Explanation]:
         """The set with a known family exchanged for each other one that may be named, where near."""
@@ -222,7 +223,7 @@ class Search:
         across, fits = self._beside(held)
         if len(joining) > 1:
             every = self.blocks.gains(across, fits)
-            gains = {f: every[self.blocks.rows[f]] for f in joining}
+            gains = {f: every[:, self.blocks.rows[f]] for f in joining}
         else:
             gains = {f: self.blocks.gains_of(f, across, fits) for f in joining}
         return {f: self._grown(explanation, held, f, gains[f]) for f in joining}
@@ -237,14 +238,17 @@ class Search:
         )
 
     def _averaged(self, f: int, gains: FloatArray) -> tuple[Member, float, float]:
-        """The node and size that stand for a family, its gain averaged over all, and how much that adds."""
+        """The node and size that stand for a family, its gain averaged over all, and how much that adds.
+
+        To the gain without a sign: members beside which others are met are held without one.
+        """
         rows = self.blocks.rows[f]
-        table = gains + self.blocks.prior[rows]
+        table = gains.sum(axis=0) + self.blocks.prior[rows]
         row, column = divmod(int(np.argmax(table)), table.shape[1])
         averaged = log_sum_exp(table)
         at = rows.start + row
         member = Member(f, self.blocks.nodes[at], float(self.blocks.lengths[at, column]))
-        return member, averaged, averaged - float(gains[row, column])
+        return member, averaged, averaged - float(gains[0, row, column])
 
     def _refined(self, explanation: Explanation) -> Explanation:
         """Each member's node and size chosen again beside the others, and averaged over there."""

@@ -138,3 +138,14 @@ def test_dropped_rows_change_nothing_that_is_systematic(tactical):
     scale = np.abs(whole.constants).max(axis=0)
     # What is left is the noise of the readings that were dropped.
     assert np.all(np.abs(part.constants - whole.constants) < 1e-2 * np.maximum(scale, 1e-12))
+
+
+def test_an_effect_that_the_twin_has_too_much_of_is_told_with_what_there_is_of_it():
+    """A lag can't be negative, and what corrects one that is too long is."""
+    twin = load_twin("nominal").with_nominal(b1=0.1, g=1.0, m=1.0, b2=1e-3)
+    real, late = (twin.with_effect("sensor_lag", lag_s) for lag_s in (20.0, 100.0))
+    runs = [_run(real, 1, 20.0), _run(real, 2, 20.0, hot=40), _run(real, 3, 20.0, hot=45)]
+    found = diagnose(TwinModel(late), runs[:2], runs[2:], plan=False)
+    assert any("sensor_lag" in item.members for item in found.named)
+    (own,) = (e for e in found.effects if e.id == "sensor_lag")
+    assert own.amplitude == pytest.approx(20.0, abs=20.0)

@@ -12,7 +12,7 @@ from fogml.gap.causes import onset
 from fogml.gap.diagnosis import _closed_share, with_epoch
 from fogml.gap.fitted_model import explained
 from fogml.gap.how_far import Foretold
-from fogml.gap.inference import infer
+from fogml.gap.inference import infer, over_noises
 from fogml.gap.model import TwinModel, with_effects
 from fogml.gap.planning import next_run as ahead
 from fogml.gap.posterior import _likeliest, judge
@@ -46,6 +46,17 @@ def test_candidates_share_what_is_expected_before_the_data(found):
     assert search.prior_probability(known[:1]) == pytest.approx(expected / len(known))
     assert search.prior_probability(known[:3]) == pytest.approx(3 * expected / len(known))
     assert search.prior_probability(["nothing_of_the_kind"]) == 0.0
+
+
+def test_a_set_has_the_evidence_over_noises_that_the_search_gave_it_at_one(found):
+    """Signs that physics gives count in both, of each member, whichever joined last."""
+    search, nodes = found.search, found.columns.nodes
+    every = search.explanations()
+    assert any(len(e.members) > 1 and any(nodes[m.node].positive for m in e.members) for e in every)
+    searched = {e.members: e.log_evidence for e in every}
+    for e in over_noises(every, [search.field], [0.0]):
+        at_one = e.by_noise[0] + search.field.whitening.log_det
+        assert at_one == pytest.approx(searched[e.members], abs=1e-6)
 
 
 def test_what_stands_in_for_a_name_has_none_of_its_class(found):
