@@ -137,16 +137,18 @@ def setting_of(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise
     setting = Setting(scene, constants, priors, (), values)
     noises = [float(np.median(whitener_of(noise, r, priors.noise.longest_runs).deviation)) for r in scene.fit]
     for _ in range(3):
+        # Before the columns, which are as wide as the priors that coefficients are told by.
+        off = {c.name: abs(setting.values[c.name] - c.mean) for c in constants}
+        far = [c for c in constants if off[c.name] > priors.noise.far_off * c.sd]
+        more = {c.name: 2.0 * off[c.name] / c.sd for c in far}
+        setting = replace(setting, widened={**setting.widened, **more})
         least = [priors.noise.least_error * by for by in noises]
         errors = (_reading_errors(r, setting.values, by) for r, by in zip(scene.fit, least))
         setting = replace(setting, errors=tuple(errors))
         fixed = tuple(fixed_columns(setting, i, plant) for i in range(len(scene.runs)))
         whitening = Whitening(noise, setting)
         found = Posterior.of(whitening.stacked(fixed), whitening.stacked([r.gap for r in scene.fit]))
-        values = setting.values_of(found.mean)
-        off = {c.name: abs(values[c.name] - c.mean) / c.sd for c in constants}
-        more = {name: 2.0 * z for name, z in off.items() if z > priors.noise.far_off}
-        setting = replace(setting, values=values, fixed=fixed, widened={**setting.widened, **more})
+        setting = replace(setting, values=setting.values_of(found.mean), fixed=fixed)
     return setting
 
 
@@ -204,11 +206,11 @@ def fixed_columns(setting: Setting, run: int, plant: Twin) -> FloatArray:
 def _through_each(rows: Rows, constants: Sequence[Constant], errors: Mapping[str, FloatArray]) -> FloatArray:
     """What readings differ by from the smooth course in the response to each constant, shape (m, c)."""
     zeros = {c.name: 0.0 for c in constants}
-    columns = [np.zeros(len(rows))] * len(constants)
+    columns = np.zeros((len(rows), len(constants)))
     for i, c in enumerate(constants):
         if c.name not in ("e0", "b0"):
-            columns[i] = through_nominal(rows, slopes(rows, zeros | {c.name: 1.0}), errors)
-    return np.column_stack(columns)
+            columns[:, i] = through_nominal(rows, slopes(rows, zeros | {c.name: 1.0}), errors)
+    return columns
 
 
 def gap_length(setting: Setting, noise: NoiseModel) -> float:

@@ -62,12 +62,15 @@ class OwnOnRun:
         Temperatures are moved by so much, up and down, for the slope of a replay.
     slopes_at
         Slopes that were worked out, by the constants.
+    off_at
+        What is a little off, the same.
     """
 
     model: GyroModel
     run: Run
     step_degc: float
     slopes_at: dict[tuple[float, ...], dict[str, FloatArray]] = field(default_factory=dict)
+    off_at: dict[tuple[float, ...], Mapping[str, FloatArray]] = field(default_factory=dict)
 
     @cached_property
     def on(self) -> ModelOnRun:
@@ -102,12 +105,17 @@ class OwnOnRun:
 
     def columns(self) -> FloatArray:
         """Response to a unit of each constant, shape (n, c); 0 where the run can't show one."""
-        told, none = self.on.columns(), np.zeros(len(self.run))
-        return np.column_stack([told.get(c.name, none) for c in self.model.constants])
+        told, found = self.on.columns(), np.zeros((len(self.run), len(self.model.constants)))
+        for column, constant in zip(found.T, self.model.constants):
+            column += told.get(constant.name, 0.0)
+        return found
 
     def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
         """What is always a little off, one standard deviation of each [deg/h], shape (n,)."""
-        return self.on.nuisances(constants)
+        key = tuple(constants.values())
+        if key not in self.off_at:
+            self.off_at[key] = self.on.nuisances(constants)
+        return self.off_at[key]
 
     def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
         """Of a candidate, per unit of its amplitude [deg/h], shape (n,)."""

@@ -76,7 +76,8 @@ def rows_of(
         own = OwnOnRun(model, run.with_columns(**recorded), settings.slope_step_degc)
         replayed = own.output({c.name: c.mean for c in model.constants})
         errors = np.zeros((len(time), 2))
-        columns = np.column_stack([samples.means(c) for c in own.columns().T])
+        told = own.columns()
+        columns = np.array([samples.means(c) for c in told.T]).reshape(told.shape[1], len(time)).T
     else:
         replayed = replayer.with_temperatures(smooth).output(twin)
         errors = _replay_errors(run, twin, replayer, even, readings, samples, replayed, settings.rougher)

@@ -148,12 +148,13 @@ def assumed(found: Inference, constants: Sequence[ConstantFit]) -> tuple[str, ..
                     f"{rows.run.name}: {one.message}; taken as it is, and if it is wrong, so is all here."
                 )
     for fit in constants:
-        off = abs(fit.value - fit.prior_mean) / fit.prior_sd
-        if fit.name in setting.widened and off > setting.priors.noise.far_off:
+        off = abs(fit.value - fit.prior_mean)
+        if fit.name in setting.widened and off > setting.priors.noise.far_off * fit.prior_sd:
             said.append(
-                f"{fit.name} = {short(fit.value, 4)} {fit.unit} is {short(off)} standard deviations off what "
-                f"was expected ({fit.prior_mean:g} ± {fit.prior_sd:g}): a unit, a sign or the twin may be "
-                f"wrong. Its prior was widened {short(setting.widened[fit.name])} times for the rest."
+                f"{fit.name} = {short(fit.value, 4)} {fit.unit} is {short(off / fit.prior_sd)} standard "
+                f"deviations off what was expected ({fit.prior_mean:g} ± {fit.prior_sd:g}): a unit, a sign "
+                f"or the twin may be wrong. Its prior was widened {short(setting.widened[fit.name])} times "
+                "for the rest."
             )
     for rows in setting.scene.runs:
         if rows.masked:

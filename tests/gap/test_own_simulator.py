@@ -1,6 +1,6 @@
 """Another simulator in the twin's place: its constants, its replay, its own candidates."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -17,6 +17,8 @@ SIZE = Quantity("amplitude", "deg/h", (0.1, 10.0), (0.1, 10.0), limits=(-1e3, 1e
 PLACE = Quantity("centre_temperature", "degC", (5.0, 35.0), (5.0, 35.0), limits=(-50.0, 90.0))
 WIDTH = Quantity("width", "degC", (3.0, 12.0), (3.0, 12.0), limits=(0.1, 50.0))
 NOISE = NoiseModel(0.02, 0.005, 0.005)
+ASKED: list[str] = []
+"""Runs of which nuisances were asked."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ class OnRun:
         return np.zeros(len(self.run))
 
     def nuisances(self, constants):
+        ASKED.append(self.run.name)
         return {"line": 0.01 * np.sin(self.run.time / 500.0)}
 
     def response(self, id, shape, constants):
@@ -154,3 +157,35 @@ def test_nothing_missing_is_nothing_missing_and_a_model_without_candidates_has_t
     assert "thermal_hysteresis" in {e.effect for e in found.evidence}
     offset = next(c for c in found.constants if c.name == "offset")
     assert offset.value == pytest.approx(1.5, abs=4.0 * offset.se)
+
+
+def test_a_model_without_constants_or_with_one_that_is_known_is_diagnosed():
+    runs = made_runs()
+
+    class Fixed(Simulator):
+        def on(self, run):
+            return Known(run)
+
+    class Known(OnRun):
+        def columns(self):
+            return {}
+
+        def output(self, constants, effects=()):
+            return super().output({}, effects) + 1.5 - 0.4 * self.run.temperature() / 20.0
+
+    found = diagnose(Fixed(("creep",), constants=()), runs[:2], runs[2:], plan=False)
+    assert found.verdict == "no_gap" and found.constants == ()
+    held = (Constant("offset", "deg/h", 1.5, 0.0), Constant("slope", "deg/h", 0.0, 1.0))
+    offset, slope = diagnose(Simulator(("creep",), constants=held), runs[:2], runs[2:], plan=False).constants
+    assert (offset.value, offset.se) == (1.5, 0.0)
+    assert slope.value == pytest.approx(-0.4, abs=4.0 * slope.se)
+
+
+def test_a_simulator_is_asked_in_time_that_is_linear_in_the_runs():
+    asked = []
+    for runs in (made_runs()[:2], [*made_runs(), *made_runs(seed=6)][:6]):
+        ASKED.clear()
+        runs = [replace(run, name=f"{i}") for i, run in enumerate(runs)]
+        diagnose(Simulator(("creep",)), runs, (), plan=False)
+        asked.append(len(ASKED) / (len(runs) + 1))
+    assert asked[1] == pytest.approx(asked[0], rel=0.2)

@@ -90,6 +90,20 @@ def test_a_constant_far_off_is_said_and_fitted_all_the_same():
     assert "standard deviations off" not in " ".join(assumed(found, [replace(far, value=1.0)]))
 
 
+def test_a_constant_far_off_that_hardly_shows_is_told_by_the_prior_that_its_column_has():
+    """What it is fitted to be changes with its prior, from one fit to the next."""
+    run = _cycle()
+    across = 0.05 * np.sin(run.time / 800.0)
+    columns = {"T_in": run.columns["T"], "T_out": run.columns["T"] + across}
+    faces = Run.from_columns("faces", time=run.time, gyro=run.gyro - 20.0 * across, **columns)
+    scene, twin = _scene(faces), load_twin("nominal")
+    noise = NoiseModel(0.1, 0.05, 0.0)
+    setting = setting_of(TwinModel(twin), twin, scene, Priors(), noise)
+    assert setting.values["g"] == pytest.approx(20.0, rel=0.02) and setting.widened["g"] > 1.0
+    own = setting.fixed[0][:, : len(setting.constants)]
+    np.testing.assert_allclose(own, scene.runs[0].constants * setting.deviations)
+
+
 def test_what_each_run_draws_anew_has_columns_of_its_own():
     scene = _scene(_cycle("a"), _cycle("b", seed=2))
     family = Family("turn_on_bias", "known", power_cycles, drawn_per_run=True)
