@@ -24,6 +24,7 @@ from fogml.gap.settings import Priors, RowSettings
 from fogml.numerals import short
 from fogml.runs.checks import refuse_dead
 from fogml.runs.run import Run
+from fogml.runs.turning import turning
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin import Twin
 
@@ -32,7 +33,9 @@ def check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -
     """Refuse runs that can't be diagnosed together."""
     if not fit:
         raise InputError("no run to diagnose is given")
-    refuse_dead((*fit, *held_out))
+    static = () if noise is None else (noise,)
+    every = (*fit, *held_out, *static)
+    refuse_dead(every)
     held: dict[str, tuple[str, str]] = {}
     for role, runs in (("fit", fit), ("held-out", held_out)):
         for run in runs:
@@ -45,8 +48,12 @@ def check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -
                     "must be one that the fit has not seen"
                 )
             held[run.hash] = role, run.name
-    units = {run.facts.unit: run.name for run in (*fit, *held_out) if run.facts.unit}
-    axes = {run.facts.axis: run.name for run in (*fit, *held_out) if run.facts.axis}
+    if noise is not None and held.get(noise.hash, ("", ""))[0] == "fit":
+        raise InputError(
+            f"{noise.name}: given as a fit run and as the noise run too; give a static run of its own"
+        )
+    units = {run.facts.unit: run.name for run in every if run.facts.unit}
+    axes = {run.facts.axis: run.name for run in every if run.facts.axis}
     for what, stated in (("unit", units), ("axis", axes)):
         if len(stated) > 1:
             listed = ", ".join(f"{name} is {what} {value}" for value, name in stated.items())
@@ -198,7 +205,7 @@ def infer(
 
 def _check_motion(scene: Scene, least_degc: float) -> None:
     moved = max(float(np.ptp(r.temperature)) for r in scene.fit)
-    if moved < least_degc and not any(np.any(r.run.rate) for r in scene.fit):
+    if moved < least_degc and not any(turning(r.run).any() for r in scene.fit):
         raise InputError(
             f"{', '.join(r.run.name for r in scene.fit)}: temperature moves by {short(moved, 2)} degC in "
             f"all; a diagnosis needs a run in which it moves by {least_degc:g} degC or more"

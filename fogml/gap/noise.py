@@ -16,12 +16,14 @@ from fogml.gap.field import Columns, Field
 from fogml.gap.frame import Setting
 from fogml.gap.linear_gaussian import LinearGaussian, size_gains
 from fogml.gap.model import AnyModel
+from fogml.gap.reading import usable_samples
 from fogml.gap.rows import Rows
 from fogml.gap.settings import STANDARD, NoiseSettings
 from fogml.gap.unknown import unknown_families
-from fogml.intervals import MEDIAN_SIZE, Z50
+from fogml.intervals import Z50
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
+from fogml.runs.turning import turning
 from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior, fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
@@ -87,9 +89,9 @@ def prior_of(
     if noise_run is None:
         wide = NoisePrior(centre, tuple(max(f, 1.001) for f in factor))  # type: ignore[arg-type]
         return wide, "the runs themselves, what moves with temperature taken out"
-    if np.any(noise_run.rate):
+    if turning(noise_run).any():
         raise InputError(f"{noise_run.name}: the table turns in it; a noise run is a static one")
-    usable = _usable(noise_run)
+    usable, _ = usable_samples(noise_run)
     time, values = noise_run.time[usable], noise_run.gyro_deg_h[usable]
     if len(time) < settings.fewest_samples:
         raise InputError(
@@ -98,7 +100,7 @@ def prior_of(
     warmth = _motion(noise_run, usable, settings)
     # Whatever the size: a static run tells N within a per cent, whatever was thought before. Roughly from
     # neighbouring samples; B and K in the ratios that were expected.
-    white = float(np.median(np.abs(np.diff(values)))) / MEDIAN_SIZE / np.sqrt(2.0)
+    white = math.sqrt(0.5 * float(np.mean(np.diff(values) ** 2)))
     n = max(white * np.sqrt(float(np.median(np.diff(time))) / 3600.0), 1e-9)
     ratio = n / centre.N
     start = NoiseModel(n, max(centre.B, 1e-9) * ratio, max(centre.K, 1e-9) * ratio)
@@ -112,10 +114,6 @@ def prior_of(
     )
     spread = np.hypot(np.minimum(fit.standard_errors, np.log(3.0)), np.log(settings.unit_factor))
     return NoisePrior(fit.model, tuple(np.exp(spread))), f"static run {noise_run.name}"
-
-
-def _usable(run: Run) -> BoolArray:
-    return np.asarray(np.isfinite(run.gyro_deg_h) & np.isfinite(run.time))
 
 
 def _motion(run: Run, usable: BoolArray, settings: NoiseSettings) -> FloatArray | None:
@@ -219,7 +217,7 @@ class StaticRun:
     def of(cls, run: Run, settings: NoiseSettings) -> StaticRun:
         """Means over even rows; those with few samples are left out."""
         run = run.without_dropouts
-        usable = _usable(run)
+        usable, _ = usable_samples(run)
         time, values = run.time[usable], run.gyro_deg_h[usable]
         step = float(np.median(np.diff(time)))
         width = max(1, -(-len(time) // settings.static_rows))

@@ -13,8 +13,10 @@ from fogml.gap.model import GyroModel
 from fogml.gap.own_simulator import OwnOnRun
 from fogml.gap.rows import BySample, Rows, delta_of
 from fogml.gap.settings import STANDARD, RowSettings
+from fogml.runs.checks import rests, usual_rest
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import Run
+from fogml.runs.turning import turning
 from fogml.signals.clock import gap_starts
 from fogml.signals.smoothing import Smoothness, at_points, smoothed
 from fogml.twin.inputs import Inputs
@@ -49,7 +51,7 @@ def rows_of(
     run = run.without_dropouts
     if not run.temperature_columns:
         raise Unusable(f"{run.name}: holds no temperature; a replay needs 'T [degC]' or 'T_in [degC]'")
-    usable, masked = _usable(run, settings)
+    usable, masked = usable_samples(run, settings)
     if usable.sum() < settings.fewest:
         empty = [name for name, values in run.columns.items() if not np.isfinite(values).any()]
         if empty:
@@ -133,7 +135,8 @@ def _replay_errors(
     return np.column_stack(columns)
 
 
-def _usable(run: Run, settings: RowSettings) -> tuple[BoolArray, dict[str, int]]:
+def usable_samples(run: Run, settings: RowSettings = STANDARD.rows) -> tuple[BoolArray, dict[str, int]]:
+    """Samples that are no outlier, nor at a limit of the output, shape (n,); those left out, by why."""
     usable = np.ones(len(run), dtype=np.bool_)
     for values in run.columns.values():
         usable &= np.isfinite(values)
@@ -142,16 +145,19 @@ def _usable(run: Run, settings: RowSettings) -> tuple[BoolArray, dict[str, int]]
     outliers, _ = find_outliers(gyro, run.columns.get("rate"))
     masked["outliers"] = len(outliers)
     usable[outliers] = False
-    if not np.any(run.rate):
+    if not turning(run).any():
         held = gyro[usable]
         varied = np.ptp(gyro) > 0.0 and len(np.unique(gyro)) > settings.distinct
         for extreme in (held.max(), held.min()) if len(held) else ():
             at = np.concatenate([[0], (gyro == extreme).astype(np.int8), [0]])
             edges = np.flatnonzero(np.diff(at))
-            for first, last in zip(edges[::2], edges[1::2]):
-                if last - first >= settings.saturated and varied:
+            spells = list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+            longest = max(last - first for first, last in spells)
+            limit = varied and longest >= settings.saturated and not rests(longest, usual_rest(held))
+            for first, last in spells:
+                if limit and last - first >= settings.saturated:
                     usable[first:last] = False
-                    masked["saturated"] = masked.get("saturated", 0) + int(last - first)
+                    masked["saturated"] = masked.get("saturated", 0) + last - first
     return usable, {why: n for why, n in masked.items() if n}
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from fogml.arrays import BoolArray
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted
 from fogml.numerals import short
 from fogml.runs.findings import DEAD, SATURATION, Finding, dead_words
@@ -170,24 +170,32 @@ def _saturated(run: Run) -> Iterator[Finding]:
         return  # so few steps hold no shape of noise that could be cut off
     usual = None
     for extreme, at in extremes:
-        count, spell = int(np.count_nonzero(at)), _longest(at)
+        count = int(np.count_nonzero(at))
         if not _may_saturate(at):
             continue
-        if usual is None:
-            same = gyro[1:] == gyro[:-1]
-            usual = _longest(same & ~extremes[0][1][1:] & ~extremes[1][1][1:]) + 1
+        usual = usual or usual_rest(gyro)
         if extreme == greatest:
             next_to = np.max(gyro, where=~at, initial=-np.inf)
         else:
             next_to = np.min(gyro, where=~at, initial=np.inf)
         is_tail = count <= _TAIL_RATIO * np.count_nonzero(gyro == next_to)
-        # A quiet output of few steps rests at other values too.
-        rests = usual >= _RESTING_SAMPLES and spell < _RESTING_RATIO * usual
-        if not is_tail and not rests:
+        if not is_tail and not rests(_longest(at), usual):
             message = f"{count} samples of 'gyro' at its extreme of {extreme:.6g}; the output may saturate"
             at_rest = int(np.count_nonzero(at & ~turning(run)))
             row = int(np.argmax(at)) + 1
             yield Finding(SATURATION, message, column="gyro", row=row, count=count, at_rest=at_rest)
+
+
+def usual_rest(values: FloatArray) -> int:
+    """The most neighbouring samples of one value between the extremes; 1 where none are alike."""
+    least, greatest = large.extremes(values)
+    same = (values[1:] == values[:-1]) & (values[1:] != least) & (values[1:] != greatest)
+    return _longest(same) + 1
+
+
+def rests(spell: int, usual: int) -> bool:
+    """Whether so many samples at an extreme are no limit: a quiet output of few steps rests elsewhere too."""
+    return usual >= _RESTING_SAMPLES and spell < _RESTING_RATIO * usual
 
 
 def _may_saturate(at: BoolArray) -> bool:

@@ -159,6 +159,12 @@ def of_unit(run, name):
         (lambda a, b, c: ([], [c], {}), "no run to diagnose"),
         (lambda a, b, c: ([a], [c], {"without": ["no_such"]}), "--without no_such: there is no such effect"),
         (lambda a, b, c: ([a], [c], {"noise": b}), "the table turns in it"),
+        (lambda a, b, c: ([a], [c], {"noise": a}), "a.csv: given as a fit run and as the noise run too"),
+        (lambda a, b, c: ([a], [c], {"noise": of_a_gyro(b)}), "'gyro' is 0 in every sample"),
+        (
+            lambda a, b, c: ([of_unit(a, "1")], [c], {"noise": of_unit(still(), "2")}),
+            "different units .* still is unit 2",
+        ),
         (
             lambda a, b, c: ([a.with_columns(flow=np.full(len(a), np.nan))], [c], {}),
             "column 'flow' holds no number",

@@ -41,6 +41,29 @@ def test_a_static_run_tells_the_noise_whatever_was_expected():
         assert min(prior.factor) >= STANDARD.noise.unit_factor
 
 
+@pytest.mark.parametrize("step", [0.05, 1.0])
+def test_a_static_run_in_steps_as_coarse_as_its_noise_tells_it_as_what_a_finer_output_does(step):
+    """White noise of 0.5 deg/h a sample: most neighbours are alike in steps of 1 deg/h."""
+    run = static()
+    prior, _ = prior_of(MODEL, run.with_columns(gyro=step * np.round(run.gyro / step)))
+    # Rounding adds white noise of a step over the root of 12, or hides some.
+    added = np.hypot(NOISE.N, step / np.sqrt(12.0) * np.sqrt(5.0 / 3600.0))
+    assert 0.8 * NOISE.N < prior.centre.N < 1.2 * added
+    assert prior.centre.B < 3.0 * NOISE.B and prior.centre.K < 3.0 * NOISE.K
+
+
+def test_spikes_and_the_noise_of_a_recorded_rate_are_no_noise_of_a_static_run():
+    run = static()
+    gyro = run.gyro.copy()
+    gyro[[700, 2500]] += [400.0, -300.0]
+    rate = 1e-4 * np.random.default_rng(4).standard_normal(len(run))
+    spoilt = run.with_columns(gyro=gyro, rate=rate)
+    (one, _), (other, _) = prior_of(MODEL, spoilt), prior_of(MODEL, run)
+    assert pytest.approx(other.centre.N, rel=0.01) == one.centre.N
+    told = [StaticRun.of(r, STANDARD.noise).log_likelihood(NOISE) for r in (spoilt, run)]
+    assert told[0] == pytest.approx(told[1], abs=3.0)
+
+
 def test_without_a_static_run_the_prior_is_the_models():
     prior, _ = prior_of(MODEL, None)
     assert (prior.centre.N, prior.centre.B, prior.centre.K) == (NOISE.N, NOISE.B, NOISE.K)

@@ -76,6 +76,16 @@ def test_an_output_of_few_values_has_no_limit(values, masked):
     assert rows_of(run, load_twin("nominal"), 600).masked == masked
 
 
+def test_a_quiet_output_that_rests_at_its_least_and_greatest_values_has_no_limit():
+    """In 81 steps of ten times its noise: it rests at each of them, and longest where it is hot and cold."""
+    time = np.arange(0.0, 36000.0, 5.0)
+    T = np.interp(time, [0, 3600, 9000, 18000, 26000, 36000], [25, 25, 60, 60, -20, -20])
+    gyro = 0.1 * (T - 25.0) + 0.01 * np.random.default_rng(1).standard_normal(len(time))
+    run = Run.from_columns("steps", time=time, gyro=0.1 * np.round(gyro / 0.1), T=T)
+    rows = rows_of(run, load_twin("nominal"), 1200)
+    assert not rows.masked and rows.temperature.max() > 59.0
+
+
 def test_a_constant_far_off_is_said_and_fitted_all_the_same():
     scene = _scene(_cycle(offset=-40.0))
     twin = load_twin("nominal")
