@@ -183,8 +183,9 @@ def infer(
         best = points.best
         search = Search(Field(setting, columns, points.noises[best]))
         found = search.explanations()
-        found = [e for e in found if e.score > found[0].score - priors.hopeless or not e.members]
-        found = found[: how.rescored]
+        near = found[0].score - priors.hopeless
+        # That nothing acts is asked at every noise: it may be far behind at one alone.
+        found = [e for i, e in enumerate(found) if (i < how.rescored and e.score > near) or not e.members]
         # What fast causes make looks like noise until they are known.
         whites = [points.with_white(factor) for factor in factors]
         sure = found[: how.sure]

@@ -98,16 +98,17 @@ def judge(found: Inference) -> Judgement:
     best = _likeliest(found, first)
     exchanges = [e for f in search.names(best) for e in search.exchanged(best, f).values()]
     explanations = _with_more(first, found.with_others(exchanges))
-    best = _likeliest(found, explanations)
-    alike = {f: _alike(found, explanations, best, f) for f in search.names(best)}
-    instead = {f: search.unexplained(best, set(alike[f])) for f in alike}
-    more = [e for sets in instead.values() for e in sets]
-    explanations = _with_more(explanations, found.with_others(more))
     likeliest = _likeliest(found, explanations)
-    if likeliest.key != best.key and not search.names(likeliest) >= search.names(best):
+    # What stands in for names may turn out likelier than they: then what that has is asked.
+    for _ in range(2):
         best = likeliest
         alike = {f: _alike(found, explanations, best, f) for f in search.names(best)}
         instead = {f: search.unexplained(best, set(alike[f])) for f in alike}
+        more = [e for sets in instead.values() for e in sets]
+        explanations = _with_more(explanations, found.with_others(more))
+        likeliest = _likeliest(found, explanations)
+        if search.names(likeliest) >= search.names(best):
+            break
     weights, energies = _weights(explanations), _energies(found, best)
     causes = []
     for f, members in alike.items():

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fogml.gap import posterior
 from fogml.gap.cards import cards_of
 from fogml.gap.causes import onset
 from fogml.gap.diagnosis import _closed_share, with_epoch
@@ -90,6 +91,29 @@ def test_a_name_is_exchanged_for_each_that_explains_nearly_as_much(found):
         f for f, e in search.instead(best, name, others).items() if e.score > at_hand - search.priors.hopeless
     }
     assert near and near <= search.exchanged(best, name).keys()
+
+
+def test_what_stands_in_for_names_is_asked_of_the_set_that_is_told(found, monkeypatch):
+    """A set with another name turns out likelier by what stands in for the first one."""
+    search, best = found.search, found.explanations[0]
+    (name,) = search.names(best)
+    other = max(search.exchanged(best, name).values(), key=lambda e: e.score)
+    other = replace(other, by_noise=best.by_noise)
+    told = iter([best, best, other, other])
+    monkeypatch.setattr(posterior, "_likeliest", lambda found, explanations: next(told))
+    judged = judge(found)
+    assert judged.best is other
+    alike = {f for f in search.families_of("known") if found.columns.families[f].id in judged.causes[0].ids}
+    assert {e.key for e in search.unexplained(other, alike)} <= {e.key for e in judged.explanations}
+
+
+def test_that_nothing_acts_is_asked_at_every_noise_however_many_sets_are_likelier(found):
+    few = replace(STANDARD, search=replace(STANDARD.search, rescored=3))
+    scene = found.scene
+    again = infer(found.model, [r.run for r in scene.runs], (), None, (), few)
+    sets = [e.key for e in again.explanations]
+    assert len(sets) == 4 and sets[-1] == ()
+    assert len(again.explanations[-1].by_noise) == len(again.points.noises)
 
 
 def test_a_name_is_no_surer_than_its_evidence_and_what_carries_over(found):
