@@ -94,11 +94,12 @@ def test_a_name_is_exchanged_for_each_that_explains_nearly_as_much(found):
 
 
 def test_what_stands_in_for_names_is_asked_of_the_set_that_is_told(found, monkeypatch):
-    """A set with another name turns out likelier by what stands in for the first one."""
+    """A set with another name, and something unknown, turns out likelier than the first one."""
     search, best = found.search, found.explanations[0]
     (name,) = search.names(best)
     other = max(search.exchanged(best, name).values(), key=lambda e: e.score)
-    other = replace(other, by_noise=best.by_noise)
+    beside = next(f for f in search.families_of("unknown") if found.columns.families[f].id == "steps")
+    other = replace(search.grown(other, [beside]), by_noise=best.by_noise)
     told = iter([best, best, other, other])
     monkeypatch.setattr(posterior, "_likeliest", lambda found, explanations: next(told))
     judged = judge(found)
