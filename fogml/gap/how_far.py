@@ -252,12 +252,12 @@ def _own_noise(rows: Rows, found: Inference, made: Sequence[FloatArray]) -> tupl
     """The noise of a held-out run, white as it is itself where that differs beyond chance, and words."""
     model = found.field.whitening.noise
     settings = found.setting.priors.noise
-    own, usual = white_noise(rows, settings.noiseless * found.points.prior.centre.N, made), model.N
-    # The median of second differences of m rows is told to about 1.4 over the root of m.
-    chance = 3.0 * 1.4 / math.sqrt(len(rows))
-    if abs(math.log(own / usual)) < max(chance, math.log(settings.unit_factor)):
+    own, count = white_noise(rows, settings.noiseless * found.points.prior.centre.N, made)
+    # The median of so many second differences is told to about 1.4 over their root.
+    chance = 3.0 * 1.4 / math.sqrt(count) if count else math.inf
+    if abs(math.log(own / model.N)) < max(chance, math.log(settings.unit_factor)):
         return model, ""
-    apart = f"{short(own / usual, 2)} times" if own > usual else f"only {short(own / usual, 2)} times"
+    apart = f"{short(own / model.N, 2)} times" if own > model.N else f"only {short(own / model.N, 2)} times"
     said = f"white noise of this run is {apart} that of the others; its floor is its own"
     return replace(model, N=own), said
 

@@ -173,22 +173,32 @@ def noise_points(
 def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:
     """White noise as second differences of neighbouring rows show it, slow noise as expected."""
     least = setting.priors.noise.noiseless * prior.centre.N
-    found = [white_noise(rows, least) for rows in setting.scene.fit]
+    found = [white_noise(rows, least)[0] for rows in setting.scene.fit]
     return replace(prior.centre, N=float(np.median(found)))
 
 
-def white_noise(rows: Rows, least: float, made: Sequence[FloatArray] = ()) -> float:
+def white_noise(rows: Rows, least: float, made: Sequence[FloatArray] = ()) -> tuple[float, int]:
     """Coefficient N of one run from second differences of neighbouring rows, by median, or the least.
 
-    What constants, and causes where there are some, may do to them is fitted first: a table that turns all
-    the time makes no noise. `made` is what each cause may make of the run, columns of shape (m, k) [deg/h].
+    And by how many differences it is told. What constants, and causes where there are some, may do to them
+    is fitted first: a table that turns all the time makes no noise. Each difference counts by what that
+    leaves of white noise in it. `made` is what each cause may make of the run, columns of shape (m, k)
+    [deg/h].
     """
     second = np.diff(rows.gap, 2)
     columns = np.diff(np.concatenate([rows.constants, *made], axis=1), 2, axis=0)
     columns = columns / np.maximum(np.abs(columns).max(axis=0), np.finfo(float).tiny)
-    left = second - columns @ np.linalg.lstsq(columns, second)[0]
-    found = float(np.median(np.abs(left))) / Z50 / math.sqrt(6.0) * math.sqrt(rows.row_s / 3600.0)
-    return max(found, least)
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    basis = basis[:, sizes > np.finfo(float).eps * len(columns) * sizes.max(initial=0.0)]
+    left = second - basis @ (basis.T @ second)
+    # With D the second differences, the diagonal of (I - U U') D D' (I - U U').
+    through = np.diff(np.pad(basis, ((2, 2), (0, 0))), 4, axis=0)
+    variance = 6.0 - np.sum(basis * (2.0 * through - basis @ (basis.T @ through)), axis=1)
+    told = variance > 1e-6
+    if not told.any():
+        return least, 0
+    found = float(np.median(np.abs(left[told]) / np.sqrt(variance[told]))) / Z50
+    return max(found * math.sqrt(rows.row_s / 3600.0), least), len(second) - basis.shape[1]
 
 
 def _score(setting: Setting, columns: Columns, noise: NoiseModel) -> float:

@@ -20,7 +20,7 @@ def _rows(seed):
 
 
 def test_white_noise_of_a_run_is_known_as_well_as_stated():
-    logs = np.log([white_noise(_rows(seed), 0.0) for seed in range(1500)])
+    logs = np.log([white_noise(_rows(seed), 0.0)[0] for seed in range(1500)])
     # Its deviation is known to 2 % of 1500 runs.
     assert np.std(logs) == pytest.approx(STATED / math.sqrt(ROWS), rel=0.12)
 
@@ -34,7 +34,7 @@ def test_beyond_three_of_its_errors_the_noise_is_the_runs_own(monkeypatch, error
         points=SimpleNamespace(prior=SimpleNamespace(centre=usual)),
     )
     white = usual.N * math.exp(errors * STATED / math.sqrt(ROWS))
-    monkeypatch.setattr(how_far, "white_noise", lambda *_: white)
+    monkeypatch.setattr(how_far, "white_noise", lambda *_: (white, ROWS))
     model, said = how_far._own_noise(range(ROWS), found, ())
     assert (white if own else usual.N) == model.N and model.B == usual.B
     assert bool(said) == own

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fogml.errors import InputError
 from fogml.gap.model import TwinModel
-from fogml.gap.noise import StaticRun, prior_of
+from fogml.gap.noise import StaticRun, prior_of, white_noise
 from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -62,6 +63,24 @@ def test_spikes_and_the_noise_of_a_recorded_rate_are_no_noise_of_a_static_run():
     assert pytest.approx(other.centre.N, rel=0.01) == one.centre.N
     told = [StaticRun.of(r, STANDARD.noise).log_likelihood(NOISE) for r in (spoilt, run)]
     assert told[0] == pytest.approx(told[1], abs=3.0)
+
+
+@pytest.mark.parametrize(("rows", "steps"), [(75, 40), (1200, 0)])
+def test_white_noise_of_a_run_is_as_large_as_it_is_however_much_may_be_made_of_it(rows, steps):
+    """Steps at every other row take away half of the noise, and leave other rows more of theirs."""
+    rng, place = np.random.default_rng(6), np.arange(rows)
+    made = [(place[:, None] >= rows * (np.arange(steps) + 1.0) / (steps + 1.0)).astype(float)]
+    constants = np.cos(np.pi * place[:, None] * np.arange(8) / rows)
+    told = []
+    for _ in range(100):
+        run = SimpleNamespace(gap=0.5 * rng.standard_normal(rows), constants=constants, row_s=36.0)
+        told.append(white_noise(run, 1e-9, made))
+    assert np.mean([found for found, _ in told]) == pytest.approx(0.05, rel=0.05)
+    scatter = np.std([found for found, _ in told]) / 0.05
+    assert {count for _, count in told} == {rows - 2 - 7 - steps}
+    assert scatter == pytest.approx(1.4 / np.sqrt(rows - 9 - steps), rel=0.25)
+    # Where all may be made, none is told.
+    assert white_noise(run, 1e-9, [np.eye(rows)]) == (1e-9, 0)
 
 
 def test_without_a_static_run_the_prior_is_the_models():
