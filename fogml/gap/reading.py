@@ -181,7 +181,9 @@ def _even(
         smooth[name], noise[name] = (means, Smoothness(0.0, 0.0)) if exact else smoothed(means)
     drives = {name: samples.means(values) for name, values in recorded.drives.items()}
     if "angle" in drives:
-        drives["angle"] = np.interp(time, recorded.time, recorded.drives["angle"])
+        angle = recorded.drives["angle"]
+        angle = np.unwrap(angle, period=360.0) if recorded.angle_begins_anew else angle
+        drives["angle"] = np.interp(time, recorded.time, angle)
     even = replace(
         recorded,
         time=time,

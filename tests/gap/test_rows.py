@@ -86,6 +86,18 @@ def test_a_quiet_output_that_rests_at_its_least_and_greatest_values_has_no_limit
     assert not rows.masked and rows.temperature.max() > 59.0
 
 
+def test_a_table_that_goes_round_is_between_two_samples_where_it_was():
+    """Its recorded angle begins anew after 360 deg, often in the middle of a row."""
+    time = 10.0 * np.arange(1200)
+    turned = 0.5 * time + 3.0
+    columns = {"rate": np.full(len(time), 0.5), "angle": turned % 360.0, "T": 25.0 + 0.001 * time}
+    rows = rows_of(
+        Run.from_columns("turns", time=time, gyro=1800.0 + 0.0 * time, **columns), load_twin("nominal"), 600
+    )
+    expected = np.exp(1j * np.radians(np.interp(rows.even.time, time, turned)))
+    np.testing.assert_allclose(np.exp(1j * np.radians(rows.even.angle_deg)), expected, atol=1e-9)
+
+
 def test_a_constant_far_off_is_said_and_fitted_all_the_same():
     scene = _scene(_cycle(offset=-40.0))
     twin = load_twin("nominal")
