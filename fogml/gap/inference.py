@@ -151,11 +151,16 @@ def infer(
     Raises
     ------
     InputError
-        If no run can be used, or no temperature moves.
+        If runs are too many, none can be used, or no temperature moves.
     """
     tell("reading inputs")
     plant = plant_of(model)
     most = min(priors.most_rows, priors.most_of_all // max(len(fit), 1))
+    # The first rows of a run, and those after its gaps, are lost.
+    least = 2 * priors.rows.fewest
+    if most < least:
+        several = priors.most_of_all // least
+        raise InputError(f"{len(fit)} runs to fit on: a diagnosis takes {several} at most; give the longest")
     runs, unusable = _rows(fit, model, plant, most, priors.rows)
     if not runs:
         raise InputError("; ".join(reason for _, reason in unusable))

@@ -157,6 +157,10 @@ def of_unit(run, name):
         (lambda a, b, c: ([of_a_gyro(a)], [c], {}), "'gyro' is 0 in every sample"),
         (lambda a, b, c: ([a[:15]], [c], {}), "a diagnosis needs more"),
         (lambda a, b, c: ([], [c], {}), "no run to diagnose"),
+        (
+            lambda a, b, c: ([a.with_columns(gyro=a.gyro + i) for i in range(200)], [c], {}),
+            "200 runs to fit on: a diagnosis takes 93 at most",
+        ),
         (lambda a, b, c: ([a], [c], {"without": ["no_such"]}), "--without no_such: there is no such effect"),
         (lambda a, b, c: ([a], [c], {"noise": b}), "the table turns in it"),
         (lambda a, b, c: ([a], [c], {"noise": a}), "a.csv: given as a fit run and as the noise run too"),
