@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -143,10 +144,14 @@ def inferred(
     # The unit ages from its first run on, whichever it is.
     fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
     fit, held_out = named_apart(fit, held_out)
+    since_s = -math.inf
     if not held_out:
-        fit, held_out = keep_back(fit, (priors or STANDARD).rows.kept_back)
+        # Replayed with what came before it, which the gyro remembers.
+        held_out = fit[-1:]
+        fit, (part,) = keep_back(fit, (priors or STANDARD).rows.kept_back)
+        since_s = float(part.time[0])
     with one_thread():
-        return infer(model, fit, held_out, noise, without, priors or STANDARD, tell)
+        return infer(model, fit, held_out, noise, without, priors or STANDARD, tell, since_s)
 
 
 def answered(

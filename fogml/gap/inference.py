@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -145,8 +146,9 @@ def infer(
     without: Iterable[str],
     priors: Priors,
     tell: Progress = lambda what: None,
+    since_s: float = -math.inf,
 ) -> Inference:
-    """The posterior of the causes behind the fit runs.
+    """The posterior of the causes behind the fit runs; held-out ones are judged from `since_s` on [s].
 
     Raises
     ------
@@ -164,7 +166,9 @@ def infer(
     runs, unusable = _rows(fit, model, plant, most, priors.rows)
     if not runs:
         raise InputError("; ".join(reason for _, reason in unusable))
-    held, more = _rows(held_out, model, plant, most, priors.rows)
+    # A stretch that was kept back has as many rows as a run of its own.
+    most = most if since_s == -math.inf else math.ceil(most / priors.rows.kept_back)
+    held, more = _rows(held_out, model, plant, most, priors.rows, since_s)
     scene = Scene((*runs, *held), len(runs), model.grade, (), candidates_of(model), priors.grids)
     _check_motion(scene, priors.rows.least_motion_degc)
     prior, source = prior_of(model, noise, priors.noise)
@@ -233,13 +237,18 @@ def _nodes(explanations: Sequence[Explanation]) -> list[int]:
 
 
 def _rows(
-    runs: Sequence[Run], model: AnyModel, plant: Twin, most: int, settings: RowSettings
+    runs: Sequence[Run],
+    model: AnyModel,
+    plant: Twin,
+    most: int,
+    settings: RowSettings,
+    since_s: float = -math.inf,
 ) -> tuple[list[Rows], list[tuple[str, str]]]:
     usable, unusable = [], []
     own = None if isinstance(model, TwinModel) else model
     for run in runs:
         try:
-            usable.append(rows_of(run, plant, most, own, settings))
+            usable.append(rows_of(run, plant, most, own, settings, since_s=since_s))
         except Unusable as error:
             unusable.append((run.name, str(error)))
     return usable, unusable

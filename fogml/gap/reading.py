@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -38,10 +39,12 @@ def rows_of(
     settings: RowSettings = STANDARD.rows,
     *,
     exact: bool = False,
+    since_s: float = -math.inf,
 ) -> Rows:
     """A run brought to `most` rows at most, replayed by the twin, or by another model in its place.
 
-    Of `exact` readings there is nothing to be smoothed.
+    Of `exact` readings there is nothing to be smoothed. What comes before `since_s` on the run's clock is
+    past that the rest remembers, and no row.
 
     Raises
     ------
@@ -51,7 +54,7 @@ def rows_of(
     run = run.without_dropouts
     if not run.temperature_columns:
         raise Unusable(f"{run.name}: holds no temperature; a replay needs 'T [degC]' or 'T_in [degC]'")
-    usable, masked = usable_samples(run, settings)
+    usable, left_out = usable_samples(run, settings)
     if usable.sum() < settings.fewest:
         empty = [name for name, values in run.columns.items() if not np.isfinite(values).any()]
         if empty:
@@ -85,7 +88,8 @@ def rows_of(
         errors = _replay_errors(run, twin, replayer, even, readings, samples, replayed, settings.rougher)
         columns = _constant_columns(samples, even, step)
     memory_s = 2.0 * DELTA_WINDOW_S if model is None else model.memory_s
-    kept = counts >= settings.least_full * width
+    since_s = max(since_s, float(run.time[0]))
+    kept = (counts >= settings.least_full * width) & (time - 0.5 * row_s >= since_s - step)
     kept &= time - row_s >= run.time[0] + min(memory_s, 0.1 * run.span_s) - step
     kept &= ~_after_gaps(run, time, row_s, memory_s, settings.short_gap)
     if kept.sum() < settings.fewest:
@@ -105,7 +109,8 @@ def rows_of(
         by_sample=samples,
         replay_errors=errors[kept],
         own=own,
-        masked=masked,
+        since_s=since_s,
+        masked={why: n for why, at in left_out.items() if (n := int(np.sum(at[run.time >= since_s])))},
     )
 
 
@@ -135,15 +140,16 @@ def _replay_errors(
     return np.column_stack(columns)
 
 
-def usable_samples(run: Run, settings: RowSettings = STANDARD.rows) -> tuple[BoolArray, dict[str, int]]:
+def usable_samples(run: Run, settings: RowSettings = STANDARD.rows) -> tuple[BoolArray, dict[str, BoolArray]]:
     """Samples that are no outlier, nor at a limit of the output, shape (n,); those left out, by why."""
     usable = np.ones(len(run), dtype=np.bool_)
     for values in run.columns.values():
         usable &= np.isfinite(values)
-    masked = {"no number": int((~usable).sum())}
+    none = np.zeros(len(run), dtype=np.bool_)
+    left_out = {"no number": ~usable, "outliers": none.copy(), "saturated": none}
     gyro = np.where(np.isfinite(run.gyro), run.gyro, 0.0)
     outliers, _ = find_outliers(gyro, run.columns.get("rate"))
-    masked["outliers"] = len(outliers)
+    left_out["outliers"][outliers] = True
     usable[outliers] = False
     if not turning(run).any():
         held = gyro[usable]
@@ -156,9 +162,8 @@ def usable_samples(run: Run, settings: RowSettings = STANDARD.rows) -> tuple[Boo
             limit = varied and longest >= settings.saturated and not rests(longest, usual_rest(held))
             for first, last in spells:
                 if limit and last - first >= settings.saturated:
-                    usable[first:last] = False
-                    masked["saturated"] = masked.get("saturated", 0) + last - first
-    return usable, {why: n for why, n in masked.items() if n}
+                    left_out["saturated"][first:last] = True
+    return usable & ~left_out["saturated"], left_out
 
 
 def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float, short: float) -> BoolArray:

@@ -69,6 +69,8 @@ class Rows:
         (m, 2) [deg/h].
     own
         A laboratory's own simulator on the run, where that takes the twin's place.
+    since_s
+        Where what is judged begins on the run's clock [s]; what came before is its past.
     masked
         Samples left out, by why.
     cache
@@ -89,6 +91,7 @@ class Rows:
     by_sample: BySample
     replay_errors: FloatArray
     own: OwnOnRun | None = None
+    since_s: float = 0.0
     masked: Mapping[str, int] = field(default_factory=dict)
     cache: dict[tuple[Any, ...], Inputs] = field(default_factory=dict)
 

@@ -101,8 +101,8 @@ class Scene:
             # Differences of the moments themselves: a clock without a zone is not this machine's.
             first = min(started)  # type: ignore[type-var]
             return tuple((s - first).total_seconds() for s in started)  # type: ignore[operator]
-        edges = np.cumsum([0.0, *(float(r.run.span_s) + r.row_s for r in self.runs)])
-        return tuple(float(e) - float(r.run.time[0]) for e, r in zip(edges, self.runs))
+        edges = np.cumsum([0.0, *(float(r.run.time[-1]) - r.since_s + r.row_s for r in self.runs)])
+        return tuple(float(e) - r.since_s for e, r in zip(edges, self.runs))
 
     @property
     def in_time(self) -> list[int]:

@@ -149,3 +149,23 @@ def test_an_effect_that_the_twin_has_too_much_of_is_told_with_what_there_is_of_i
     assert any("sensor_lag" in item.members for item in found.named)
     (own,) = (e for e in found.effects if e.id == "sensor_lag")
     assert own.amplitude == pytest.approx(20.0, abs=20.0)
+
+
+def test_a_stretch_that_is_kept_back_is_foretold_with_what_came_before_it():
+    """A node that lags by an hour is warm where the last stretch begins, in the cold."""
+    twin = load_twin("nominal")
+    steps = ["soak at 25 degC for 1 h"]
+    for hot, cold in ((50, -10), (45, -5), (55, -15)):
+        steps += [f"ramp to {hot} degC at 1 degC/min", f"soak at {hot} degC for 1 h"]
+        steps += [f"ramp to {cold} degC at 1 degC/min", f"soak at {cold} degC for 1 h"]
+    steps += ["ramp to 25 degC at 1 degC/min", "soak at 25 degC for 2 h"]
+    run = _simulated(twin.with_effect("hidden_thermal_node", 0.1), steps, 5, 30.0)
+    found = diagnose(TwinModel(twin), [run], plan=False)
+    assert found.held_out_is_part and "hidden_thermal_node" in found.named[0].members
+    (far,) = found.how_far
+    assert far.closed == pytest.approx(1.0, abs=0.1)
+    # Of the whole run the last quarter is drawn, and no more.
+    (held,) = (s for s in found.series if s.role == "held_out")
+    assert held.time_s[0] == pytest.approx(0.75 * run.time[-1], abs=200.0)
+    (fitted,) = (s for s in found.series if s.role == "fit")
+    assert fitted.time_s[-1] < held.time_s[0]

@@ -15,8 +15,9 @@ from fogml.gap.shapes import Grids
 
 
 def rows(first_s: float, span_s: float, row_s: float, started: datetime | None) -> SimpleNamespace:
-    run = SimpleNamespace(span_s=span_s, time=np.array([first_s]), facts=SimpleNamespace(started=started))
-    return SimpleNamespace(run=run, row_s=row_s)
+    time = np.array([first_s, first_s + span_s])
+    run = SimpleNamespace(time=time, facts=SimpleNamespace(started=started))
+    return SimpleNamespace(run=run, row_s=row_s, since_s=first_s)
 
 
 def begun(*runs: SimpleNamespace) -> Any:
