@@ -224,14 +224,16 @@ def carries(found: Inference, explanation: Explanation) -> float:
 
 
 def _with_more(explanations: Sequence[Explanation], more: Sequence[Explanation]) -> tuple[Explanation, ...]:
-    """With explanations that are known at one noise: as far ahead at every one; the likeliest first."""
+    """With explanations that are known at one noise: as far ahead at every one; the likeliest first.
+
+    Of a set that is there already the evidence over all noises stays, unless its members are better chosen.
+    """
     best = explanations[0]
     have = {e.key: e for e in explanations}
     for e in more:
-        ahead = e.log_evidence - best.log_evidence
-        told = replace(e, by_noise=tuple(x + ahead for x in best.by_noise))
-        if e.key not in have or told.score > have[e.key].score:
-            have[e.key] = told
+        if e.key not in have or e.log_evidence > have[e.key].log_evidence + 1e-6:
+            ahead = e.log_evidence - best.log_evidence
+            have[e.key] = replace(e, by_noise=tuple(x + ahead for x in best.by_noise))
     return tuple(sorted(have.values(), key=lambda e: -e.score))
 
 

@@ -108,6 +108,16 @@ def test_what_stands_in_for_names_is_asked_of_the_set_that_is_told(found, monkey
     assert {e.key for e in search.unexplained(other, alike)} <= {e.key for e in judged.explanations}
 
 
+def test_a_set_that_is_asked_again_at_one_noise_keeps_its_evidence_over_all(found):
+    every = found.explanations
+    again = posterior._with_more(every, [replace(e, by_noise=()) for e in every])
+    assert [(e.members, e.score) for e in again] == [(e.members, e.score) for e in every]
+    better = replace(every[3], log_evidence=every[3].log_evidence + 1.0, by_noise=())
+    ahead = better.log_evidence - every[0].log_evidence
+    (told,) = (e for e in posterior._with_more(every, [better]) if e.key == better.key)
+    assert told.by_noise == pytest.approx([x + ahead for x in every[0].by_noise])
+
+
 def test_that_nothing_acts_is_asked_at_every_noise_however_many_sets_are_likelier(found):
     few = replace(STANDARD, search=replace(STANDARD.search, rescored=3))
     scene = found.scene
