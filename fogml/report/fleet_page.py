@@ -204,7 +204,8 @@ def line_sentences(line: Mapping[str, Any]) -> list[str]:
     told = [
         f"Of {plural(line['units'], 'diagnosed unit')} more than half share {', '.join(shared)}."
         if shared
-        else f"No cause is shared by more than half of {plural(line['units'], 'diagnosed unit')}."
+        else "Of no cause these runs show that it is shared by more than half of "
+        f"{plural(line['units'], 'diagnosed unit')}."
     ]
     # What may be nothing is no reason to change anything.
     first = next((cause for cause in line["causes"] if cause["energy_share_ci90"][0] > 0.0), None)

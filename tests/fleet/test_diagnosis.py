@@ -119,7 +119,7 @@ def test_it_stands_in_the_fleet_s_page_and_json(line: dict[str, Any]) -> None:
     assert "diagnosis" not in fleet_json([{**o, "found": {}} for o in outcomes], {})
     # No cause in any: the page stands.
     none = [{**o, "found": {"diagnosis": unit()}} for o in outcomes]
-    assert "No cause is shared" in fleet_page(fleet_json(none, {}))
+    assert "Of no cause these runs show that it is shared" in fleet_page(fleet_json(none, {}))
 
 
 def test_a_diagnosis_becomes_what_the_fleet_wants() -> None:
