@@ -296,6 +296,8 @@ def _correlated(spectrum: Spectrum, best: NoiseChoice, size: float, times: int =
     middle = float(minimize_scalar(loss, bounds=bounds, method="bounded", options={"xatol": _TIME_TOLD}).x)
     near = 0.1 * step
     bend = (loss(middle - near) - 2.0 * loss(middle) + loss(middle + near)) / near**2
+    if not np.isfinite(bend):
+        return []
     error = min(1.0 / np.sqrt(max(bend, 1e-6)), 0.5 * step)
     places = np.clip(middle + error * _TIMES, low, high)
     for at in places:
