@@ -27,7 +27,8 @@ def found_cause(
     scene, settings = found.scene, found.setting.priors.reported
     declared = scene.candidates[cause.ids[0]]
     _, high = declared.amplitude.range(scene.grade)
-    by_run = _by_run(found, every, cause, card.lacking)
+    by_run, begun = _by_run(found, every, cause, card.lacking), onset(found, every, cause)
+    acting = since(scene, by_run, begun)
     return Found(
         effect=cause.ids[0],
         stage=declared.stage,
@@ -41,9 +42,9 @@ def found_cause(
             if q.name in card.value.shape
         },
         by_run=by_run,
-        consistent=agree(by_run, settings.disagree),
-        grows=growth(scene, by_run, settings.grows),
-        onset=onset(found, every, cause),
+        consistent=agree(acting, settings.disagree),
+        grows=growth(scene, acting, settings.grows),
+        onset=begun,
         share=share,
         place=declared.place,
         times_usual=abs(card.lacking) / high,
@@ -74,6 +75,17 @@ def _columns_of(held: Field, every: Foretold, cause: Cause) -> BoolArray:
     told = [np.zeros(held.fixed.shape[1], dtype=np.bool_)]
     told += [np.full(held.block(m.node).shape[1], m in cause.members) for m in every.members]
     return np.concatenate(told)
+
+
+def since(scene: Scene, by_run: Sequence[RunAmplitude], begun: Onset | None) -> tuple[RunAmplitude, ...]:
+    """Sizes of the runs through all of which a cause acts."""
+    if begun is None:
+        return tuple(by_run)
+    names = [scene.runs[i].run.name for i in scene.in_time]
+    first = names.index(begun.run)
+    if begun.time_s > float(scene.runs[scene.in_time[first]].time_s[0]):
+        first += 1
+    return tuple(r for r in by_run if r.run in names[first:])
 
 
 def agree(by_run: Sequence[RunAmplitude], least: float = Reported.disagree) -> bool:

@@ -72,7 +72,7 @@ class Found:
     by_run
         The amplitude from each run that can show it.
     consistent
-        Whether those agree in sign and size.
+        Whether those since it acts agree in sign and size.
     grows
         Change of its size a day, in its unit; None where the runs tell of none.
     onset

@@ -142,7 +142,11 @@ def _agreement(found: Diagnosis, names: dict[str, str]) -> str:
     if doubted:
         return f"An effect of the gyro has one sign and size on every run. {listed(doubted)}: not so."
     if any(len(f.by_run) > 1 for f in found.found):
-        return "An effect of the gyro has one sign and size on every run that can show it, and so it is here."
+        begun = ", from where it began on" if any(f.onset is not None for f in found.found) else ""
+        return (
+            "An effect of the gyro has one sign and size on every run that can show it, and so it is here"
+            f"{begun}."
+        )
     return "Only one run shows it by itself, so runs can't be compared."
 
 

@@ -85,9 +85,9 @@ def _agreement(found: Found) -> str:
         way = "grows" if found.grows * found.amplitude.value > 0.0 else "fades"
         return f"{way} by {number(abs(found.grows), 2)} {unit_words(found.amplitude.unit)} a day"
     if count > 1:
-        return (
-            f"agree in sign and size ({count} runs)" if found.consistent else f"do not agree ({count} runs)"
-        )
+        # Of one that began, the runs since then are held against each other.
+        counted = f" ({count} runs)" if found.onset is None else ""
+        return f"{'agree in sign and size' if found.consistent else 'do not agree'}{counted}"
     return "one run alone can show it" if found.by_run else "no single run shows it"
 
 

@@ -8,13 +8,14 @@ import pytest
 from scipy.stats import chi2
 
 from fogml.gap.cards import _step, card_of
-from fogml.gap.causes import _by_run, agree, growth
+from fogml.gap.causes import _by_run, agree, growth, since
 from fogml.gap.field import Field, Member
 from fogml.gap.frame import with_form_errors
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import foreseen
 from fogml.gap.model import TwinModel
 from fogml.gap.result import RunAmplitude
+from fogml.gap.result_parts import Onset
 from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.runs.steps import to_steps
@@ -49,6 +50,19 @@ def test_a_slope_within_its_error_is_no_growth():
     least = STANDARD.reported.grows * 10.0 * error
     assert growth(_scene([0.0, 10.0]), _sizes(1.0, 1.0 + 0.99 * least)) is None
     assert growth(_scene([0.0, 10.0]), _sizes(1.0, 1.0 + 1.01 * least)) is not None
+
+
+def test_what_began_neither_grows_nor_disagrees_by_that():
+    sizes, scene = _sizes(0.0, 0.02, 1.0, 1.02), _scene([0.0, 10.0, 20.0, 30.0])
+    scene.in_time = range(4)
+    for one in scene.runs:
+        one.time_s = np.array([30.0, 90.0])
+    assert not agree(sizes) and growth(scene, sizes) > 0.0
+    acting = since(scene, sizes, Onset("r2", 30.0, 50.0))
+    assert acting == sizes[2:] and agree(acting) and growth(scene, acting) is None
+    # Of a run in which it began a part alone shows it.
+    assert since(scene, sizes, Onset("r1", 90.0, 50.0)) == sizes[2:]
+    assert since(scene, sizes, None) == sizes
 
 
 def test_a_step_of_the_sensors_is_read_off_their_records():
