@@ -71,6 +71,9 @@ def rows_of(
     counts = np.bincount(row[usable], minlength=count).astype(np.float64)
     spread = (row_s**2 - step**2) / 12.0
     given = replace(replayer.recorded, coil=twin.coil, light=twin.light)
+    if not turning(run).any():
+        # Noise of a recorded rate turns nothing: no cause follows it.
+        given = replace(given, table_rate=np.zeros(len(run)))
     samples = BySample(given, row, usable, counts, spread)
     time = run.time[0] + row_s * np.arange(count) + 0.5 * (width - 1) * step
     even, readings, noise = _even(samples, time, twin, replayer, exact)

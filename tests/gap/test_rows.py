@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fogml.gap.catalogue import machines, moisture, other_plant, power_cycles
+from fogml.gap.catalogue import families_of, machines, moisture, other_plant, power_cycles
 from fogml.gap.field import Columns
 from fogml.gap.frame import setting_of
 from fogml.gap.model import TwinModel
+from fogml.gap.own_simulator import candidates_of
 from fogml.gap.reading import rows_of
 from fogml.gap.reports import assumed
 from fogml.gap.result import ConstantFit
@@ -96,6 +97,21 @@ def test_a_table_that_goes_round_is_between_two_samples_where_it_was():
     )
     expected = np.exp(1j * np.radians(np.interp(rows.even.time, time, turned)))
     np.testing.assert_allclose(np.exp(1j * np.radians(rows.even.angle_deg)), expected, atol=1e-9)
+
+
+def test_no_cause_follows_the_noise_of_a_recorded_rate_of_a_table_that_rests():
+    run, twin = _cycle(), load_twin("nominal")
+    rate = 1e-4 * np.random.default_rng(5).standard_normal(len(run))
+    rows = rows_of(run.with_columns(rate=rate, gyro=run.gyro - 3600.0 * rate), twin, 600)
+    assert not rows.turns
+    scene = Scene((rows,), 1, "tactical", candidates=candidates_of(TwinModel(twin)))
+    dead_zone = effect("deadband")
+    assert not np.any(rows.response(dead_zone, dead_zone.default_shape("tactical")))
+    (bent,) = (f for f in families_of(twin, scene) if f.id == "sf_nonlinearity")
+    assert not any(np.any(block.columns) for block in bent.build(rows, scene, {}))
+    # Of a table that turns it does.
+    turned = rows_of(run.with_columns(rate=np.where(run.time > 5000.0, 1.0, 0.0)), twin, 600)
+    assert turned.turns and np.any(turned.response(dead_zone, dead_zone.default_shape("tactical")))
 
 
 def test_a_constant_far_off_is_said_and_fitted_all_the_same():
