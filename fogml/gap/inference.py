@@ -167,8 +167,11 @@ def infer(
     if not runs:
         raise InputError("; ".join(reason for _, reason in unusable))
     # A stretch that was kept back has as many rows as a run of its own.
-    most = most if since_s == -math.inf else math.ceil(most / priors.rows.kept_back)
+    kept_back = since_s > -math.inf
+    most = math.ceil(most / priors.rows.kept_back) if kept_back else most
     held, more = _rows(held_out, model, plant, most, priors.rows, since_s)
+    # The run that it is part of is used.
+    more = [(f"{name}, kept-back part", reason) for name, reason in more] if kept_back else more
     scene = Scene((*runs, *held), len(runs), model.grade, (), candidates_of(model), priors.grids)
     _check_motion(scene, priors.rows.least_motion_degc)
     prior, source = prior_of(model, noise, priors.noise)

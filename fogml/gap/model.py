@@ -168,7 +168,8 @@ class TwinModel:
     Parameters
     ----------
     twin
-        The twin to start from; effects that are on in it are part of it and no candidates.
+        The twin to start from; effects that are on in it are part of it. A diagnosis asks whether their sizes
+        are wrong; `candidates` has none of them.
     lacks
         Ids of effects that the catalogue is taken not to hold: as if nobody knew of them.
     """

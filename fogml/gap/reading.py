@@ -59,9 +59,7 @@ def rows_of(
         empty = [name for name, values in run.columns.items() if not np.isfinite(values).any()]
         if empty:
             raise Unusable(f"{run.name}: column '{empty[0]}' holds no number; fill it or leave it out")
-        raise Unusable(
-            f"{run.name}: {int(usable.sum())} rows have a number in every column; a diagnosis needs more"
-        )
+        raise Unusable(f"{run.name}: {int(usable.sum())} samples can be used; a diagnosis needs more")
     step = float(np.median(np.diff(run.time)))
     width = max(1, -(-round(run.span_s / step + 1.0) // most))
     row_s = width * step
@@ -96,7 +94,10 @@ def rows_of(
     kept &= time - row_s >= run.time[0] + min(memory_s, 0.1 * run.span_s) - step
     kept &= ~_after_gaps(run, time, row_s, memory_s, settings.short_gap)
     if kept.sum() < settings.fewest:
-        raise Unusable(f"{run.name}: its stretches between gaps are too short for a replay")
+        raise Unusable(
+            f"{run.name}: {int(kept.sum())} rows lie long enough after its start and gaps for a replay; a "
+            f"diagnosis needs {settings.fewest}"
+        )
     return Rows(
         run=run,
         gap=samples.means(run.gyro_deg_h - replayed)[kept],

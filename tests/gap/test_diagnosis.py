@@ -127,6 +127,14 @@ def test_an_effect_that_is_no_candidate_gets_no_certain_wrong_name():
     assert far.run == "b.csv" and far.recalibrated > 0.0
 
 
+def test_a_run_whose_last_stretch_is_too_short_to_be_judged_is_fitted_all_the_same():
+    a, b, _ = plain(1)
+    found = diagnose(TWIN, [a, b[:30]], plan=False)
+    assert found.fit == ("a.csv", "b.csv") and not found.how_far
+    ((name, reason),) = found.unusable
+    assert name == "b.csv, kept-back part" and "rows lie long enough after its start" in reason
+
+
 def test_records_without_noise_have_no_gap_to_the_twin_that_made_them():
     a, _, c = (r.with_columns(gyro=replay(TWIN, r)) for r in plain(1))
     found = diagnose(TWIN, [a], [c], plan=False)
