@@ -16,7 +16,6 @@ from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.noise import white_noise
 from fogml.gap.posterior import Cause
 from fogml.gap.result_parts import HowFar
-from fogml.gap.rows import Rows
 from fogml.gap.where import averages
 from fogml.intervals import TAILS, Z90
 from fogml.numerals import listed, short
@@ -165,9 +164,7 @@ class HeldOut:
         self._settings = settings = found.setting.priors.reported
         self._rng = np.random.default_rng([seed, run])
         self._windows = windows = averages(self.rows, settings.averaging_s)
-        nodes = [found.columns.nodes[m.node] for m in members]
-        made = [found.columns.by_run[run][:, n.start : n.stop] for n in nodes]
-        model, self._noisier = _own_noise(self.rows, found, made)
+        model, self._noisier = _own_noise(found, run, members)
         self._before = _square(windows.of(self.rows.gap))
         self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
         self._floor = float(floor_square(model, windows.time, windows.window_s))
@@ -248,16 +245,29 @@ class HeldOut:
         )
 
 
-def _own_noise(rows: Rows, found: Inference, made: Sequence[FloatArray]) -> tuple[NoiseModel, str]:
-    """The noise of a held-out run, white as it is itself where that differs beyond chance, and words."""
-    model = found.field.whitening.noise
+def _own_noise(found: Inference, run: int, members: Sequence[Member]) -> tuple[NoiseModel, str]:
+    """The noise of a held-out run, white as it is itself where that differs beyond chance.
+
+    And words where the fit runs' own differs, too: what no form holds of a cause may count as noise there.
+    """
+    model, scene = found.field.whitening.noise, found.setting.scene
     settings = found.setting.priors.noise
-    own, count = white_noise(rows, settings.noiseless * found.points.prior.centre.N, made)
+    nodes = [found.columns.nodes[m.node] for m in members]
+
+    def white(i: int) -> tuple[float, int]:
+        made = [found.columns.by_run[i][:, n.start : n.stop] for n in nodes]
+        return white_noise(scene.runs[i], settings.noiseless * found.points.prior.centre.N, made)
+
+    own, count = white(run)
     # The median of so many second differences is told to about 1.4 over their root.
     chance = 3.0 * 1.4 / math.sqrt(count) if count else math.inf
-    if abs(math.log(own / model.N)) < max(chance, math.log(settings.unit_factor)):
+    least = max(chance, math.log(settings.unit_factor))
+    if abs(math.log(own / model.N)) < least:
         return model, ""
-    apart = f"{short(own / model.N, 2)} times" if own > model.N else f"only {short(own / model.N, 2)} times"
+    times = own / float(np.median([white(i)[0] for i in range(scene.fitted)]))
+    if abs(math.log(times)) < least:
+        return replace(model, N=own), ""
+    apart = f"{'' if times > 1.0 else 'only '}{short(times, 2)} times"
     said = f"white noise of this run is {apart} that of the others; its floor is its own"
     return replace(model, N=own), said
 

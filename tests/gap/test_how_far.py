@@ -25,16 +25,21 @@ def test_white_noise_of_a_run_is_known_as_well_as_stated():
     assert np.std(logs) == pytest.approx(STATED / math.sqrt(ROWS), rel=0.12)
 
 
+@pytest.mark.parametrize("others", [1.0, 0.7])
 @pytest.mark.parametrize(("errors", "own"), [(2.9, False), (3.1, True), (-2.9, False), (-3.1, True)])
-def test_beyond_three_of_its_errors_the_noise_is_the_runs_own(monkeypatch, errors, own):
+def test_beyond_three_of_its_errors_the_noise_is_the_runs_own(monkeypatch, errors, own, others):
+    """And is said to be where the fit runs themselves show another one."""
     usual = NoiseModel(0.01, 0.001, 0.0)
+    bound = 3.0 * STATED / math.sqrt(ROWS)
+    white = usual.N * math.exp(errors / 3.0 * bound)
+    shown = {"fit": others * usual.N, "held out": white}
     found = SimpleNamespace(
         field=SimpleNamespace(whitening=SimpleNamespace(noise=usual)),
-        setting=SimpleNamespace(priors=Priors()),
+        setting=SimpleNamespace(priors=Priors(), scene=SimpleNamespace(runs=list(shown), fitted=1)),
         points=SimpleNamespace(prior=SimpleNamespace(centre=usual)),
+        columns=None,
     )
-    white = usual.N * math.exp(errors * STATED / math.sqrt(ROWS))
-    monkeypatch.setattr(how_far, "white_noise", lambda *_: (white, ROWS))
-    model, said = how_far._own_noise(range(ROWS), found, ())
+    monkeypatch.setattr(how_far, "white_noise", lambda run, *_: (shown[run], ROWS))
+    model, said = how_far._own_noise(found, 1, ())
     assert (white if own else usual.N) == model.N and model.B == usual.B
-    assert bool(said) == own
+    assert bool(said) == (own and abs(math.log(white / shown["fit"])) > bound)
