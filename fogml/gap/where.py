@@ -141,8 +141,15 @@ class _Averaged:
             np.full(len(gap), floor),
             g.rows.regime[windows.starts[windows.full]].astype(np.float64),
             temperature,
-            np.gradient(temperature) if len(temperature) > 1 else np.zeros(len(temperature)),
+            _changes(temperature, windows.stretch),
         )
+
+
+def _changes(values: FloatArray, stretch: IndexArray) -> FloatArray:
+    """Mean change to the neighbours of the same stretch, shape (k,); 0 without one."""
+    joined = np.pad(np.diff(stretch) == 0, 1)
+    steps = np.where(joined, np.diff(values, prepend=values[0], append=values[-1]), 0.0)
+    return np.asarray((steps[:-1] + steps[1:]) / np.maximum(joined[:-1].astype(np.float64) + joined[1:], 1.0))
 
 
 def _excess(values: FloatArray, floors: FloatArray) -> tuple[float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.settings import STANDARD
-from fogml.gap.where import GapOnRun, _temperatures, averages, where
+from fogml.gap.where import GapOnRun, _changes, _temperatures, averages, where
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -80,6 +80,13 @@ def test_no_segment_reaches_over_a_gap_of_the_record():
         pytest.approx((1495.0, 2495.0), abs=100.0),
         pytest.approx((5995.0, 6995.0), abs=100.0),
     ]
+
+
+def test_changes_are_gradients_within_each_stretch():
+    course = np.array([0.0, 1.0, 3.0, 9.0, 8.0, 20.0, 19.0, 17.0])
+    expected = np.concatenate([np.gradient(course[:3]), np.gradient(course[3:5]), np.gradient(course[5:])])
+    assert _changes(course, np.repeat([0, 1, 2], [3, 2, 3])) == pytest.approx(expected)
+    assert _changes(course[:2], np.array([0, 1])) == pytest.approx([0.0, 0.0])
 
 
 def test_windows_of_stretches_that_are_shorter_are_as_long_as_those():
