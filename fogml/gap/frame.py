@@ -161,7 +161,7 @@ def _reading_errors(rows: Rows, constants: Mapping[str, float], least: float) ->
     steepest = sum(float(np.abs(slope).max()) * (2.0 if n == DELTA else 1.0) for n, slope in told.items())
     columns = [np.zeros((len(rows), 0))]
     for name, smoothness in rows.smoothness.items():
-        # The waves are of length 1: none makes more than the steepest slope of it.
+        # The modes are of length 1: none makes more than the steepest slope of it.
         if name in READ and smoothness.noise * steepest >= least:
             found = through_nominal(rows, told, {name: smoothness.errors(len(rows.kept))})
             columns.append(found[:, np.sum(found**2, axis=0) > least**2])

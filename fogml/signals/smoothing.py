@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import comb
 
 import numpy as np
@@ -29,7 +30,7 @@ from fogml.signals.clock import Clock, gap_starts
 
 PENALTIES = np.geomspace(1e-3, 1e8, 23)
 LEAST_PASSED = 0.1
-"""Share of a wave that the smoother lets through under which it is taken for none."""
+"""Share of a mode that the smoother lets through under which it is taken for none."""
 _ORDER = 3
 _THIRD = np.array([-1.0, 3.0, -3.0, 1.0])
 
@@ -44,15 +45,22 @@ class Smoothness:
     def errors(self, n: int) -> FloatArray:
         """What the smooth course may differ by from the true one: columns of unit priors, shape (n, k).
 
-        The posterior covariance of a spline is the noise's variance times the smoother; waves that it hardly
-        lets through are left out.
+        The posterior covariance of a spline is the noise's variance times the smoother (G. Wahba, J. R.
+        Statist. Soc. B 45 (1983) 133); of its modes those are left out that it hardly lets through.
         """
-        waves = np.arange(n)
-        passed = 1.0 / (1.0 + self.penalty * (2.0 - 2.0 * np.cos(np.pi * waves / n)) ** _ORDER)
-        kept = waves[(passed > LEAST_PASSED)]
-        basis = np.cos(np.pi * np.outer(np.arange(n) + 0.5, kept) / n)
-        basis *= np.where(kept == 0, np.sqrt(1.0 / n), np.sqrt(2.0 / n))
-        return np.asarray(self.noise * np.sqrt(passed[kept]) * basis)
+        passed, modes = _modes(n, self.penalty)
+        return self.noise * np.sqrt(passed) * modes
+
+
+@lru_cache(maxsize=8)
+def _modes(n: int, penalty: float) -> tuple[FloatArray, FloatArray]:
+    """Modes of the smoother of n readings, shape (n, k), and the share of each that it lets through."""
+    from scipy.linalg import eig_banded
+
+    roughest = (1.0 / LEAST_PASSED - 1.0) / penalty if penalty > 0.0 else np.inf
+    # No third difference is rougher than 64 times its square.
+    values, modes = eig_banded(_bands(n), select="v", select_range=(-1.0, min(roughest, 4.0**_ORDER + 1.0)))
+    return 1.0 / (1.0 + penalty * np.maximum(values, 0.0)), modes
 
 
 def smoothed(values: FloatArray, share: float = 1.0) -> tuple[FloatArray, Smoothness]:

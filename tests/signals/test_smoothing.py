@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.signals.smoothing import PENALTIES, smoothed, window_difference
+from fogml.signals.smoothing import PENALTIES, Smoothness, smoothed, window_difference
 
 
 def generalised_score(values: np.ndarray, penalty: float) -> tuple[float, float]:
@@ -37,6 +37,18 @@ def test_courses_are_those_of_a_dense_smoother_with_a_share_of_the_penalty(share
     third = np.diff(np.eye(80), 3, axis=0)
     expected = np.linalg.solve(np.eye(80) + share * found.penalty * third.T @ third, values)
     np.testing.assert_allclose(smooth, expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("penalty", [0.0, 1.0, 1e3, 1e6])
+def test_errors_of_a_course_are_those_of_a_dense_smoother_at_its_ends_too(penalty: float) -> None:
+    """Modes of which a tenth passes are left out: several per cent of the variance."""
+    third = np.diff(np.eye(120), 3, axis=0)
+    dense = 0.3**2 * np.linalg.inv(np.eye(120) + penalty * third.T @ third)
+    errors = Smoothness(0.3, penalty).errors(120)
+    told = errors @ errors.T
+    assert np.diagonal(told) == pytest.approx(np.diagonal(dense), rel=0.15)
+    left = np.linalg.eigvalsh(dense - told)
+    assert left.min() > -1e-12 and left.max() < 0.1 * 0.3**2 + 1e-12
 
 
 def test_a_difference_of_windows_is_that_of_their_means() -> None:
