@@ -12,14 +12,14 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.gap.model import GyroModel
 from fogml.gap.own_simulator import OwnOnRun
-from fogml.gap.rows import BySample, Rows, delta_of
+from fogml.gap.rows import BySample, Rows
 from fogml.gap.settings import STANDARD, RowSettings
 from fogml.runs.checks import rests, usual_rest
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import Run
 from fogml.runs.turning import turning
 from fogml.signals.clock import gap_starts
-from fogml.signals.smoothing import Smoothness, at_points, smoothed
+from fogml.signals.smoothing import Smoothness, at_points, smoothed, window_difference
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, nominal_columns
 from fogml.twin.plant.fit import estimate_nodes
@@ -223,5 +223,5 @@ def _constant_columns(samples: BySample, even: Inputs, sample_s: float) -> Float
     if np.any(even.table_rate):
         fast = nominal_columns(by_sample)
         told |= {name: samples.means(fast[name]) for name in ("e0", "k1", "k2")}
-    told["m"] = delta_of(even.time, even.temperature("T"), sample_s)
+    told["m"] = window_difference(even.time, even.temperature("T"), DELTA_WINDOW_S, 0.5 * sample_s)
     return np.column_stack([told.get(name, np.zeros(len(even.time))) for name in NAMES])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -250,18 +249,6 @@ class BySample:
         return replace(self.recorded.afresh(), temperatures=smooth, sensors={}, cache={})
 
 
-def delta_of(time: FloatArray, course: FloatArray, sample_s: float) -> FloatArray:
-    """DeltaT of a smooth course as a replay of samples has it [degC], shape as the course.
-
-    Its windows hold whole samples: at 20 s four of them and three. They are integrals here, so that rows that
-    were dropped change nothing; where the window before holds no sample there is no difference.
-    """
-    newest, both = (math.ceil(n * DELTA_WINDOW_S / sample_s - 1e-6) for n in (1, 2))
-    if newest == both:
-        return np.zeros_like(course)
-    return window_difference(time, course, newest * sample_s, (both - newest) * sample_s, 0.5 * sample_s)
-
-
 def slopes(rows: Rows, constants: Mapping[str, float]) -> dict[str, FloatArray]:
     """Change of the nominal output with each temperature and with DeltaT, on the even rows."""
     if rows.own is not None:
@@ -281,7 +268,8 @@ def through_nominal(
         if name == DELTA:
             error = errors.get("T", errors.get("T_in"))
             if error is not None:
-                error = delta_of(rows.even.time, error, rows.run.sample_s)
+                ahead = 0.5 * rows.run.sample_s
+                error = window_difference(rows.even.time, error, DELTA_WINDOW_S, ahead)
         else:
             error = errors.get(name, errors.get({"T": "T_in", "T_in": "T"}.get(name, name)))
         if error is not None:

@@ -106,9 +106,9 @@ def _bands(n: int) -> FloatArray:
 
 
 def window_difference(
-    time: FloatArray, values: FloatArray, newest_s: float, before_s: float, ahead_s: float = 0.0
+    time: FloatArray, values: FloatArray, window_s: float, ahead_s: float = 0.0
 ) -> FloatArray:
-    """Mean over the newest window less the mean over the one before, as integrals over time; shape as given.
+    """Mean over the last window less the mean over the one before, as integrals over time; shape as given.
 
     Values are a cubic spline between samples, and what they first were before. Samples that stand for the
     interval that ends at them hold what was half of it `ahead_s`.
@@ -122,8 +122,8 @@ def window_difference(
         return np.asarray(before + total(np.maximum(at, time[0])))
 
     end = time + ahead_s
-    here, middle, first = (integral(end - back) for back in (0.0, newest_s, newest_s + before_s))
-    return np.asarray((here - middle) / newest_s - (middle - first) / before_s)
+    here, before = integral(end), integral(end - window_s)
+    return np.asarray((here - 2.0 * before + integral(end - 2.0 * window_s)) / window_s)
 
 
 def at_points(

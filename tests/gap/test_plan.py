@@ -70,8 +70,8 @@ def test_information_is_that_of_the_replay_and_the_dense_covariance(rehearsed):
     size = np.sqrt(np.diag(exact))
     white = responses(rehearsal, of)
     found = white.T @ white
-    # The slope of a width is taken over a larger step there.
-    np.testing.assert_allclose(found / np.outer(size, size), exact / np.outer(size, size), atol=0.02)
+    # Windows of DeltaT are integrals there and sums of samples in a replay.
+    np.testing.assert_allclose(found / np.outer(size, size), exact / np.outer(size, size), atol=0.04)
     names = [of.parameters[i].name for i in of.wanted]
     assert names == [
         "k1",

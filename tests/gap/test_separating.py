@@ -87,13 +87,12 @@ def test_noise_twice_as_large_halves_the_distance_at_most(rehearsed):
     assert (more < first).all() and (more > 0.499 * first).all()
 
 
-def test_heat_from_within_separates_electronics_and_plate_more_than_the_chambers_alone():
+def test_only_heat_from_within_separates_electronics_and_plate():
     ask = {"facts": FACTS, "most": 60, "seed": 4}
     found = separating_run(TWIN, NOISE, CONSTANTS, [ELECTRONICS, PLATE], **ask)
     assert found is not None and found.distance >= LEAST_DISTANCE
     assert "power" in "".join(found.steps)
-    without = separating_run(TWIN, NOISE, CONSTANTS, [ELECTRONICS, PLATE], power_steps=False, **ask)
-    assert without is None or without.distance < 0.9 * found.distance
+    assert separating_run(TWIN, NOISE, CONSTANTS, [ELECTRONICS, PLATE], power_steps=False, **ask) is None
 
 
 def test_a_separating_run_is_ready_to_simulate_and_repeats():

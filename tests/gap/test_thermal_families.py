@@ -59,8 +59,8 @@ def test_readings_lose_their_noise_and_keep_their_course():
 
 def test_window_differences_are_integrals():
     time = np.array([0.0, 10.0, 30.0, 40.0, 90.0, 100.0, 200.0, 300.0])
-    np.testing.assert_allclose(window_difference(time, 0.5 * time, 40.0, 40.0)[5:], 0.5 * 40.0)
-    np.testing.assert_allclose(window_difference(time, np.full(8, 7.0), 40.0, 40.0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(window_difference(time, 0.5 * time, 40.0)[5:], 0.5 * 40.0)
+    np.testing.assert_allclose(window_difference(time, np.full(8, 7.0), 40.0), 0.0, atol=1e-12)
 
 
 def test_the_peak_of_a_transition_is_its_steps_rate():

@@ -54,9 +54,9 @@ def test_errors_of_a_course_are_those_of_a_dense_smoother_at_its_ends_too(penalt
 def test_a_difference_of_windows_is_that_of_their_means() -> None:
     """Of a parabola, and with what came before held at the first value."""
     time = np.arange(0.0, 200.0, 2.0)
-    found = window_difference(time, 3.0 + 0.1 * time**2, 20.0, 20.0)
+    found = window_difference(time, 3.0 + 0.1 * time**2, 20.0)
     # Means a window apart, each the middle's value and the same curvature's share.
     assert found[30:] == pytest.approx(0.1 * ((time[30:] - 10.0) ** 2 - (time[30:] - 30.0) ** 2))
-    early = window_difference(time, 3.0 + 0.1 * time**2, 1e4, 1e4)
+    early = window_difference(time, 3.0 + 0.1 * time**2, 1e4)
     assert early == pytest.approx(0.1 * time**3 / 3.0 / 1e4)
-    assert window_difference(time, np.full(100, 3.0), 20.0, 20.0) == pytest.approx(np.zeros(100), abs=1e-12)
+    assert window_difference(time, np.full(100, 3.0), 20.0) == pytest.approx(np.zeros(100), abs=1e-12)
