@@ -170,8 +170,10 @@ def infer(
     kept_back = since_s > -math.inf
     most = math.ceil(most / priors.rows.kept_back) if kept_back else most
     held, more = _rows(held_out, model, plant, most, priors.rows, since_s)
-    # The run that it is part of is used.
-    more = [(f"{name}, kept-back part", reason) for name, reason in more] if kept_back else more
+    if kept_back:
+        # Of a run that is not used its part is none either.
+        unused = {name for name, _ in unusable}
+        more = [(f"{name}, kept-back part", reason) for name, reason in more if name not in unused]
     scene = Scene((*runs, *held), len(runs), model.grade, (), candidates_of(model), priors.grids)
     _check_motion(scene, priors.rows.least_motion_degc)
     prior, source = prior_of(model, noise, priors.noise)
