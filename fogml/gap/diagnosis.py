@@ -199,7 +199,7 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
     ]
     far = tuple(h.how_far(after) for h in held_out)
     gaps = [
-        GapOnRun(r, r.gap - recalibrated.on(i), sum((every.of_member(i, m) for m in likeliest), 0.0 * r.gap))
+        GapOnRun(r, recalibrated.left_on(i), sum((every.of_member(i, m) for m in likeliest), 0.0 * r.gap))
         for i, r in enumerate(scene.fit)
     ]
     stages = stage_energies(found, {m: energy(found, every, recalibrated, m) for m in likeliest})

@@ -166,7 +166,8 @@ class HeldOut:
         self._windows = windows = averages(self.rows, settings.averaging_s)
         model, self._noisier = _own_noise(found, run, members)
         self._before = _square(windows.of(self.rows.gap))
-        self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
+        left = windows.of(recalibrated.left_on(run))
+        self._recalibrated = _square(left)
         self._floor = float(floor_square(model, windows.time, windows.window_s))
         as_much = model.N / found.field.whitening.noise.N
         drawn = found.points.fit.draw(self._rng, settings.draws)
@@ -183,7 +184,7 @@ class HeldOut:
         level = self._recalibrated > self._loudest
         # Slow noise moves a run's mean more than its shape, which may show a gap where the level doesn't.
         about = self._drawn(model, Fitted(np.ones((len(windows.time), 1)), ordinary=True))
-        varied = float(np.var(windows.of(self.rows.gap - recalibrated.on(run))))
+        varied = float(np.var(left))
         shape = varied - self._floor > Z90 * float(np.std(about))
         self._at_floor = not level and not shape
 

@@ -40,9 +40,7 @@ def cause_shares(
         return ()
     rng = np.random.default_rng([seed, len(groups)])
     courses = _group_courses(found, every, recalibrated, list(groups.values()), rng)
-    values = [
-        shapley_values(r.gap - recalibrated.on(i), c) for i, (r, c) in enumerate(zip(scene.fit, courses))
-    ]
+    values = [shapley_values(recalibrated.left_on(i), c) for i, c in enumerate(courses)]
     by_run = [v.sum(axis=0) for v in values]
     whole = np.sum(by_run, axis=0)
     parts: list[tuple[str | None, str | None, FloatArray]] = []
