@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import OrderedDict
 from collections.abc import Hashable, Mapping
 from copy import copy
@@ -21,8 +20,8 @@ from fogml.twin.chain import hidden, logged, through_chain
 from fogml.twin.effect import Effect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import REST, STAND_INS, Inputs
 from fogml.twin.plant.fit import estimate_nodes, recorded_power
-from fogml.twin.plant.heat import PowerWindows
-from fogml.twin.truth import Truth, read_time_on
+from fogml.twin.plant.heat import PowerWindows, windows_since
+from fogml.twin.truth import Truth
 from fogml.twin.twin import RATE_WINDOW_S, EffectSetting, Twin
 
 _CACHE_BYTES = 256_000_000
@@ -70,7 +69,7 @@ def replay(twin: Twin, run: Run, *, only: str | None = None, truth: Truth | None
 def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
     """What a run recorded, as inputs, and when the unit was on."""
     run = run.without_dropouts
-    windows = _power_windows(run)
+    windows = recorded_power(run)
     temperatures = {
         name: run.columns[name] for name in run.temperature_columns if coil_sensor_number(name) is None
     }
@@ -115,7 +114,7 @@ def _with_table_axis(run: Run) -> Facts:
 def inputs_of_truth(truth: Truth, run: Run) -> Inputs:
     """The true inputs behind a simulated run."""
     truth.check_fits(run.time, run.name)
-    windows = _windows_of(truth.time, truth.time_on)
+    windows = windows_since(truth.time, truth.time_on)
     ons = [on for on, _ in windows]
     return Inputs(
         time=truth.time,
@@ -281,19 +280,3 @@ class Replayer:
 
 
 _replayers: WeakKeyDictionary[Run, dict[int, Replayer]] = WeakKeyDictionary()
-
-
-def _power_windows(run: Run) -> PowerWindows:
-    """When the unit was on: from the column ``time_on`` of a simulated run, else as recorded."""
-    if "time_on" in run.columns and len(run):
-        return _windows_of(run.time, read_time_on(run.columns["time_on"]))
-    return recorded_power(run)
-
-
-def _windows_of(time: FloatArray, time_on: FloatArray) -> PowerWindows:
-    """When the unit was on, from the time since power-on [s]; it went off a sample after the last one."""
-    starts = np.concatenate([[0], np.flatnonzero(time_on[1:] < time_on[:-1]) + 1])
-    ons = time[starts] - time_on[starts]
-    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    offs = [*np.minimum(time[starts[1:] - 1] + step, ons[1:]).tolist(), math.inf]
-    return tuple(zip(ons.tolist(), offs))

@@ -106,6 +106,15 @@ def test_a_plant_is_fitted_to_what_was_recorded():
     assert max(found.misfit_degc.values()) < 0.01  # the sensors' noise is 0.005
 
 
+def test_a_plant_is_fitted_through_a_power_cycle_that_leaves_no_rows():
+    """What the twin's own sensors are off by is all that may be left of its true plant."""
+    true = replace(load_twin("nominal"), plant=Plant(heating=SelfHeating(3.0, 3.0, 900.0)))
+    steps = [*STEPS[:2], {STEPS[2]: ["power off for 20 min from minute 10"]}]
+    found = fit_plant(true.plant, [simulate(steps, true, sample_s=20.0, columns=COLUMNS).run])
+    assert found is not None
+    assert max(found.misfit_degc.values()) < 0.01  # 0.7 where it is taken to be on throughout
+
+
 def test_without_air_or_another_node_no_plant_is_fitted():
     for columns in (["T_in", "T_out"], ["T_chamber"]):
         run = simulate(STEPS, "nominal", sample_s=60.0, columns=columns).run

@@ -15,12 +15,14 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
+from fogml.runs.columns import TIME_ON
 from fogml.runs.run import Run
 from fogml.twin.memory import Memory
-from fogml.twin.plant.heat import ALWAYS_ON, PowerWindows
+from fogml.twin.plant.heat import ALWAYS_ON, PowerWindows, windows_since
 from fogml.twin.plant.network import AIR, PlantState, ThermalNetwork
 from fogml.twin.plant.standard import QUANTITIES
 from fogml.twin.set_up import Plant
+from fogml.twin.truth import read_time_on
 
 _ON_SHARE = 0.2
 
@@ -92,11 +94,13 @@ def estimate_nodes(
 
 
 def recorded_power(run: Run) -> PowerWindows:
-    """When the unit was on, from a run's columns ``power`` or ``supply``, and its facts.
+    """When the unit was on: from ``time_on`` of a simulated run, else from ``power`` or ``supply`` and facts.
 
     On is above a fifth of the largest value; a column that is never above 0 tells nothing. A unit that is on
     at the first sample was switched on at the fact ``powered_on``, or long before where that is not stated.
     """
+    if TIME_ON in run.columns and len(run):
+        return windows_since(run.time, read_time_on(run.columns[TIME_ON]))
     earlier = -math.inf if run.facts.powered_on is None else run.facts.powered_on
     columns = [run.columns[name] for name in ("power", "supply") if name in run.columns]
     column = next((values for values in columns if np.any(values > 0.0)), None)

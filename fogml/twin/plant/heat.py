@@ -15,6 +15,15 @@ PowerWindows = tuple[tuple[float, float], ...]
 ALWAYS_ON: PowerWindows = ((-math.inf, math.inf),)
 
 
+def windows_since(time: FloatArray, time_on: FloatArray) -> PowerWindows:
+    """When the unit was on, from the time since power-on [s]; it went off a sample after the last one."""
+    starts = np.concatenate([[0], np.flatnonzero(time_on[1:] < time_on[:-1]) + 1])
+    ons = time[starts] - time_on[starts]
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    offs = [*np.minimum(time[starts[1:] - 1] + step, ons[1:]).tolist(), math.inf]
+    return tuple(zip(ons.tolist(), offs))
+
+
 @dataclass(frozen=True)
 class SelfHeating:
     """Heat of the electronics from each power-on.
