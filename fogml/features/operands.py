@@ -202,15 +202,17 @@ class OperandReader(TokenReader):
                 f"a half width above 0 expected, found {self.found()}", token.at, "e.g. play(T, 4 degC)"
             )
         self.next += 1
-        self.unit_of_number(signal, "half width", "play(T, 4 degC)")
+        self.unit_of_number(signal, "half width", "play(T, 4 degC)", is_width=True)
         half_width = float(token.text)
         if not 0.0 < half_width < float("inf"):
             self.fail("the half width must be more than 0", token.at)
         return half_width
 
-    def unit_of_number(self, signal: Signal, what: str, example: str) -> None:
-        """Take the unit behind a number that is of a signal's kind."""
-        units = {"degC": ("degC", "K"), "": ()}.get(signal.written_unit, (signal.written_unit,))
+    def unit_of_number(self, signal: Signal, what: str, example: str, *, is_width: bool = False) -> None:
+        """Take the unit behind a number that is of a signal's kind; kelvins of what may be no temperature."""
+        units = {"degC": ("degC",), "": ()}.get(signal.written_unit, (signal.written_unit,))
+        if signal.unit == "degC" and (is_width or signal.is_difference):
+            units += ("K",)
         if self.token.kind == "name":
             if self.token.text not in units:
                 told = f"'{units[0]}'" if units else "no unit"

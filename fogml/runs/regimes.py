@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.arrays import BoolArray
+from fogml.arrays import BoolArray, IndexArray
 from fogml.runs.columns import coil_sensor_number
 from fogml.runs.run import Run
-from fogml.runs.temperature_motion import Motion, Move, find_motion
+from fogml.runs.temperature_motion import LEAST_TRAVEL_DEGC, Motion, Move, find_motion
 from fogml.runs.turning import turning
 
 START_UP_S = 1800.0
@@ -35,6 +35,8 @@ class Regimes:
     ----------
     labels
         Index into `names` for each sample, shape (n,).
+    moved
+        Rows that follow a gap in which temperature moved unseen: a regime begins there.
     """
 
     names: ClassVar[tuple[str, ...]] = (
@@ -46,6 +48,7 @@ class Regimes:
         "turning",
     )
     labels: NDArray[np.int8]
+    moved: IndexArray
 
     def mask(self, name: str) -> BoolArray:
         """True where the regime is `name`, shape (n,)."""
@@ -55,7 +58,8 @@ class Regimes:
         """The regimes one after another as (name, first row, row after the last)."""
         if len(self.labels) == 0:
             return []
-        edges = [0, *(np.flatnonzero(np.diff(self.labels)) + 1).tolist(), len(self.labels)]
+        changes = np.union1d(np.flatnonzero(np.diff(self.labels)) + 1, self.moved)
+        edges = [0, *changes.tolist(), len(self.labels)]
         return [(self.names[self.labels[a]], a, b) for a, b in pairwise(edges)]
 
 
@@ -74,26 +78,30 @@ def regimes(run: Run) -> Regimes:
     """
     known: Regimes | None = run.__dict__.get("_regimes")
     if known is None:
-        known = Regimes(_labels(run))
+        known = _found(run)
         known.labels.flags.writeable = False
         run.__dict__["_regimes"] = known
     return known
 
 
-def _labels(run: Run) -> NDArray[np.int8]:
+def _found(run: Run) -> Regimes:
     labels = np.full(len(run), _SOAK, dtype=np.int8)
+    moved = np.empty(0, dtype=np.intp)
     columns = _followed(run)
     motion = None
     if len(run) > 1 and columns:
         temperatures = [run.temperature(name) for name in columns]
         motion = find_motion(run.time, run.sample_s, temperatures)
         labels = motion.grid.to_rows(_temperature_labels(motion, run.facts.powered_on is None))
+        parts = motion.grid.part_edges[1:-1]
+        travel = np.abs(motion.temperature[parts] - motion.temperature[parts - 1])
+        moved = motion.grid.starts[parts[travel >= LEAST_TRAVEL_DEGC]]
     if run.facts.powered_on is not None:
         end = _start_up_end(run.facts.powered_on, motion)
         labels[(run.time >= run.facts.powered_on) & (run.time < end)] = _START_UP
     if "rate" in run.columns:
         labels[turning(run)] = _TURNING
-    return labels
+    return Regimes(labels, moved)
 
 
 def _followed(run: Run) -> list[str]:

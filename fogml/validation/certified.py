@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.runs.temperature_motion import LEAST_TRAVEL_DEGC
 from fogml.signals.averages import freedom_of_deviation
 from fogml.signals.distributions import deviation_within
 from fogml.validation.results import RunJudgement
@@ -36,14 +37,25 @@ def sample_deviation(values: FloatArray) -> Deviation | None:
 
 
 def at_constant_temperature(run: RunJudgement) -> FloatArray | None:
-    """Averages after compensation in the longest soak [deg/h], shape (m,); None where there is no soak."""
-    soak = np.concatenate([[False], run.series.regime == "soak", [False]])
-    edges = np.flatnonzero(np.diff(soak.astype(np.int8)))
-    spans = sorted(zip(edges[::2].tolist(), edges[1::2].tolist()), key=lambda span: span[0] - span[1])
-    if not spans:
-        return None
-    first, stop = spans[0]
-    return np.asarray(run.series.after[first:stop])
+    """Averages after compensation in the longest soak [deg/h], shape (m,); None where there is no soak.
+
+    Of one in which temperature went further than a wobble of a stay, so slowly that no ramp was told or
+    during a gap, it is the longest part in which it did not.
+    """
+    temperature, is_soak = run.series.temperature, run.series.regime == "soak"
+    best, first, least, most = slice(0, 0), 0, np.inf, -np.inf
+    for place, (value, stays) in enumerate(zip(temperature.tolist(), is_soak.tolist())):
+        if not stays:
+            first, least, most = place + 1, np.inf, -np.inf
+            continue
+        least, most = min(least, value), max(most, value)
+        while most - least > LEAST_TRAVEL_DEGC:
+            first += 1
+            held = temperature[first : place + 1]
+            least, most = float(held.min()), float(held.max())
+        if place + 1 - first > best.stop - best.start:
+            best = slice(first, place + 1)
+    return np.asarray(run.series.after[best]) if best.stop else None
 
 
 def over_temperature(run: RunJudgement) -> Deviation | None:

@@ -13,9 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from fogml.arrays import BoolArray, IndexArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
+from fogml.runs.temperature_motion import LEAST_TRAVEL_DEGC
 from fogml.runs.thermal_columns import leading_temperature
 
 ROOM_TEMPERATURE_DEGC = 25.0
@@ -38,7 +39,7 @@ class Soak:
     temperature
         Their mean temperature [degC].
     approach
-        Whether a ramp up or down led to it; ``none`` at the start of a run.
+        Whether a ramp up or down led to it; ``none`` at the start of a run, and where it was not seen.
     """
 
     rows: IndexArray
@@ -49,7 +50,8 @@ class Soak:
 def find_soaks(run: Run, used: BoolArray, least_s: float) -> tuple[Soak, ...]:
     """The soaks of a run that hold at least `least_s` seconds of usable samples.
 
-    A stay that is broken by turns of the table is one soak, of its rows at rest.
+    A stay that is broken by turns of the table or by a gap is one soak, of its rows at rest, unless
+    temperature moved meanwhile.
 
     Parameters
     ----------
@@ -64,13 +66,27 @@ def find_soaks(run: Run, used: BoolArray, least_s: float) -> tuple[Soak, ...]:
         if name in ("ramp_up", "ramp_down"):
             stays.append(("up" if name == "ramp_up" else "down", []))
         elif name == "soak":
-            stays[-1][1].append(start + np.flatnonzero(used[start:stop]))
+            rows = start + np.flatnonzero(used[start:stop])
+            if stays[-1][1] and _moved(
+                temperature, stays[-1][1][-1], rows, max(int(least_s / run.sample_s), 1)
+            ):
+                stays.append(("none", []))
+            if len(rows):
+                stays[-1][1].append(rows)
     soaks = []
     for approach, parts in stays:
         rows = np.concatenate(parts) if parts else np.empty(0, dtype=np.intp)
         if len(rows) and len(rows) * run.sample_s >= least_s:
             soaks.append(Soak(rows, float(temperature[rows].mean()), approach))
     return tuple(soaks)
+
+
+def _moved(temperature: FloatArray, before: IndexArray, after: IndexArray, edge: int) -> bool:
+    """Whether temperature moved between two parts of a stay, by the means of so many rows at their edges."""
+    if not len(after):
+        return False
+    step = temperature[after[:edge]].mean() - temperature[before[-edge:]].mean()
+    return bool(abs(step) >= LEAST_TRAVEL_DEGC)
 
 
 def temperature_sensitivity(soaks: Sequence[Soak], biases: Sequence[float]) -> float | None:

@@ -125,6 +125,8 @@ def test_any_text_parses_or_is_refused_with_a_caret_within_it(text: str) -> None
         ("beyond(T, 5 degC, 3 degC)", 10, "above the lower"),
         ("beyond(T, 5, 8 degC)", 11, "unit expected"),
         ("beyond(T, -1e999 degC, 8 degC)", 11, "too large"),
+        ("beyond(T, 253 K, 333 K)", 14, "'degC' expected"),
+        ("transition(T, 313 K, 5 K)", 18, "'degC' expected"),
         ("sine(T, 1e999 degC)", 8, "too large"),
         ("T, beyond(T)", 11, "',' expected before the lower bound"),
         ("T*(hysteresis(T))", 3, "several features"),
@@ -293,3 +295,10 @@ def test_beyond_is_what_levelling_within_a_twentieth_lacks_of_levelling_within_h
     size = np.abs(away)
     np.testing.assert_allclose(values, np.sign(away) * (40 * size / (40 + size) - 4 * size / (4 + size)))
     assert settled.all() and np.abs(values).max() < 36.0
+
+
+def test_kelvins_stand_for_degrees_where_no_temperature_is_meant() -> None:
+    assert parse_features("play(T, 4 K)") == parse_features("play(T, 4 degC)")
+    assert parse_features("beyond(T_in-T_out, 1 K, 2 K)") == parse_features(
+        "beyond(T_in-T_out, 1 degC, 2 degC)"
+    )

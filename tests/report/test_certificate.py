@@ -119,6 +119,22 @@ def test_the_sheet_tells_synthetic_data_set_up_and_figures_over_n_less_one() -> 
     assert "synthetic data" not in Page(certificate(judgement())).text
 
 
+@pytest.mark.parametrize("slow", [True, False])
+def test_a_soak_that_is_at_no_one_temperature_is_told_by_its_longest_steady_part(slow: bool) -> None:
+    """A day's slow wave, or a gap that hides a ramp: no part of the stay told spans over 1.5 degC."""
+    m = 300
+    temperature = (
+        20.0 + 10.0 * np.sin(np.linspace(0.0, 7.0, m)) if slow else np.repeat([20.0, 60.0], [120, 180])
+    )
+    series = replace(
+        judged_run(n=m).series, temperature=temperature, after=temperature.copy(), regime=np.repeat("soak", m)
+    )
+    held = at_constant_temperature(replace(judged_run(n=m), series=series))
+    spans = [(b - a, a) for a in range(m) for b in range(a + 1, m + 1) if np.ptp(temperature[a:b]) <= 1.5]
+    longest, first = max(spans, key=lambda span: (span[0], -span[1]))
+    assert np.array_equal(held, temperature[first : first + longest])
+
+
 def test_the_interval_of_a_deviation_covers_the_truth() -> None:
     rng = np.random.default_rng(0)
     hits = 0

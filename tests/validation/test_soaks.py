@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.validation.soaks import Soak, find_soaks, hysteresis, temperature_sensitivity
 
@@ -69,3 +70,32 @@ def test_rows_that_do_not_count_make_no_soak():
 def test_a_run_without_temperature_has_no_soaks():
     run = Run.from_columns(time=np.arange(100.0), gyro=np.zeros(100))
     assert find_soaks(run, np.ones(100, dtype=bool), least_s=10.0) == ()
+
+
+@pytest.mark.parametrize("hidden", ["gap", "turning"])
+def test_stays_at_two_temperatures_are_two_soaks_though_the_way_between_was_not_seen(hidden):
+    """Soaks at 20 and 60 degC; the ramp between falls into a gap, or the table turns all along it."""
+    run = stepped_run([20, 60], soak_s=3600)
+    ramp = (run.time >= 3500.0) & (run.time < 6100.0)
+    if hidden == "gap":
+        run = Run("gap", {name: values[~ramp] for name, values in run.columns.items()})
+    else:
+        run = run.with_columns(rate=np.where(ramp, 10.0, 0.0))
+    error = 0.02 * run.temperature("T")
+    found = find_soaks(run, run.rate == 0.0, least_s=100.0)
+    assert [round(soak.temperature) for soak in found] == [20, 60]
+    assert [soak.approach for soak in found] == ["none", "none"]
+    biases = [error[soak.rows].mean() for soak in found]
+    assert temperature_sensitivity(found, biases) == pytest.approx(0.02, rel=1e-6)
+    stays = [(a, b) for name, a, b in regimes(run).segments() if name == "soak"]
+    assert all(np.ptp(run.temperature("T")[a:b]) < 1.5 for a, b in stays)
+
+
+def test_a_stay_goes_on_over_a_pause_of_the_logger():
+    """A gap in which temperature stays as it was, and turns of the table, leave one soak."""
+    run = stepped_run([20, 60])
+    kept = (run.time < 11000.0) | (run.time > 12500.0)
+    run = Run("pause", {name: values[kept] for name, values in run.columns.items()})
+    run = run.with_columns(rate=np.where((run.time > 14000.0) & (run.time < 14300.0), 10.0, 0.0))
+    found = find_soaks(run, run.rate == 0.0, least_s=100.0)
+    assert [(round(soak.temperature), soak.approach) for soak in found] == [(20, "none"), (60, "up")]
