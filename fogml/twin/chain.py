@@ -219,6 +219,20 @@ def fresh(inputs: Inputs) -> Inputs:
     return replace(inputs, memory=Memory(), cache={})
 
 
+def chosen(inputs: Inputs, rows: slice | BoolArray, memory: Memory) -> Inputs:
+    """Some of the samples, with a memory of their own."""
+    if isinstance(rows, slice) and rows == slice(None):
+        return replace(inputs, memory=memory)
+    temperatures, drives = (
+        {name: values[rows] for name, values in columns.items()}
+        for columns in (inputs.temperatures, inputs.drives)
+    )
+    time, rate = inputs.time[rows], inputs.table_rate[rows]
+    return replace(
+        inputs, time=time, temperatures=temperatures, table_rate=rate, drives=drives, memory=memory, cache={}
+    )
+
+
 class Branch:
     """Plant and chain of one twin, with what they remember."""
 
@@ -288,32 +302,21 @@ class RandomErrors:
             # One record for all of them: long ones would fill the memory.
             self._sum = drawn.copy() if self._sum is None else np.add(self._sum, drawn, self._sum)
 
-    def block(
-        self, count: int, on: slice | BoolArray, inputs: Inputs
-    ) -> tuple[FloatArray, dict[str, FloatArray]]:
-        """The noise over the next block [deg/h], and each random effect's part of it.
-
-        Parameters
-        ----------
-        count
-            Samples of the block, on or off.
-        on
-            Those in which the unit is on.
-        inputs
-            What acts on the gyro in those.
-        """
-        noise = self._own.block(count)[on]
+    def block(self, inputs: Inputs) -> tuple[FloatArray, dict[str, FloatArray]]:
+        """The noise over the next block [deg/h], and each random effect's part of it."""
+        count = len(inputs)
+        noise = self._own.block(count)
         rows = slice(self._passed, self._passed + count)
         self._passed += count
         parts: dict[str, FloatArray] = {}
         for id, source in self._terms.items():
-            parts[id] = source.block(count)[on]
+            parts[id] = source.block(count)
         for declared, setting, drawn in self._varying:
-            parts[declared.id] = drawn[rows][on] * declared.strength(inputs, **setting.shape)
+            parts[declared.id] = drawn[rows] * declared.strength(inputs, **setting.shape)
         for part in parts.values():
             noise += part
         if self._sum is not None:
-            noise += self._sum[rows][on]
+            noise += self._sum[rows]
         if not self._apart:
             return noise, {}
-        return noise, parts | {id: drawn[rows][on] for id, drawn in self._steady.items()}
+        return noise, parts | {id: drawn[rows] for id, drawn in self._steady.items()}

@@ -12,7 +12,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-from fogml.twin.chain import logged, through_chain
+from fogml.twin.chain import chosen, logged, through_chain
 from fogml.twin.effect import Effect
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
@@ -171,16 +171,7 @@ def replay_after(
 
     output = through_chain(twin, whole.afresh(), nominal.afresh(), signature=signature, trusting=True).output
     last = slice(len(whole) - rows, None)
-    own = replace(
-        whole,
-        time=whole.time[last],
-        temperatures=_cut(whole.temperatures, last),
-        table_rate=whole.table_rate[last],
-        drives=_cut(whole.drives, last),
-        memory=Memory(),
-        cache={},
-    )
-    return logged(twin, output[last], own).output
+    return logged(twin, output[last], chosen(whole, last, Memory())).output
 
 
 def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tuple[Inputs, Inputs, int]:
@@ -282,10 +273,6 @@ def _drive(
 ) -> FloatArray:
     """A drive over a part; at rest where that part did not record it."""
     return part[3][name] if name in part[3] else np.full(len(part[0]), REST.get(name, 0.0))
-
-
-def _cut(columns: Mapping[str, FloatArray], rows: slice) -> dict[str, FloatArray]:
-    return {name: values[rows] for name, values in columns.items()}
 
 
 def _step(run: Run) -> float:

@@ -285,33 +285,37 @@ def _whole(counts: FloatArray) -> FloatArray:
 def _recorded(
     world: World, samples: Samples, chain: ChainOutput
 ) -> tuple[dict[str, FloatArray], Truth | None]:
-    inputs = samples.inputs
+    inputs, on = samples.inputs, samples.on
     # On the run's own clock.
-    time = inputs.time - world.clock_s if world.clock_s else inputs.time
-    gyro = world.logged(samples, chain.output + samples.noise)
+    time = inputs.time[on] - world.clock_s if world.clock_s else inputs.time[on]
+    gyro = world.logged(samples, (chain.output + samples.noise)[on])
     if world.counts_per_deg_h is not None:
         gyro = _whole(gyro * world.counts_per_deg_h)
     recorded = {"time": time, "gyro": gyro}
     for name in world.columns:
         if is_temperature(name):
-            recorded[name] = world.sensed(name, samples)
+            recorded[name] = world.sensed(name, samples)[on]
         elif name == "rate":
-            recorded[name] = inputs.table_rate
+            recorded[name] = inputs.table_rate[on]
         else:
-            recorded[name] = inputs.drives[name]
+            recorded[name] = inputs.drives[name][on]
     if world.power_cycles:
-        recorded["time_on"] = inputs.time_on_s
+        recorded["time_on"] = inputs.time_on_s[on]
     if not world.truth:
         return recorded, None
-    free = world.noise_free(samples, chain.output)
+    free = world.noise_free(samples, chain.output[on])
     others = world.other_contributions(samples, chain.output)
+
+    def kept(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        return {name: values[on] for name, values in columns.items()}
+
     return recorded, Truth(
         time,
-        inputs.temperatures,
-        inputs.table_rate,
-        inputs.drives,
-        inputs.time_on_s,
+        kept(inputs.temperatures),
+        inputs.table_rate[on],
+        kept(inputs.drives),
+        inputs.time_on_s[on],
         free.output,
-        samples.noise,
-        {**chain.contributions, **free.contributions, **others},
+        samples.noise[on],
+        {**kept(chain.contributions), **free.contributions, **kept(others)},
     )

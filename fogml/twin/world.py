@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from fogml.arrays import BoolArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
@@ -17,6 +18,7 @@ from fogml.twin.chain import (
     Branch,
     ChainOutput,
     RandomErrors,
+    chosen,
     hidden,
     logged,
     sensed,
@@ -58,13 +60,16 @@ _ALL_DRIVES = (
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Recorded samples of a block: what acts on the gyro, and the noise that comes on top [deg/h].
+    """Samples of a block: what acts on the gyro, and the noise that comes on top [deg/h].
 
-    `random` holds each random effect's part of the noise, where contributions are asked for, and
-    `without`, for each thermal effect, the inputs as they would be without it.
+    A winding remembers, and a sensor follows, what temperature does while the unit is off. `on` are the
+    samples in which it is on, which alone are recorded. `random` holds each random effect's part of the
+    noise, where contributions are asked for, and `without`, for each thermal effect, the inputs as they would
+    be without it.
     """
 
     inputs: Inputs
+    on: slice | BoolArray
     noise: FloatArray
     random: dict[str, FloatArray]
     without: dict[str, Inputs]
@@ -164,10 +169,10 @@ class World:
         """
         return tuple(id for id in self.twin.settings if not self._acted.get(id, True))
 
-    def _note(self, parts: Mapping[str, FloatArray]) -> None:
-        """Keep in mind which contributions of a block are other than 0."""
+    def _note(self, parts: Mapping[str, FloatArray], on: slice | BoolArray = slice(None)) -> None:
+        """Keep in mind which contributions of a block are other than 0 where the unit is on."""
         for id, values in parts.items():
-            self._acted[id] = self._acted.get(id, False) or bool(np.any(values))
+            self._acted[id] = self._acted.get(id, False) or bool(np.any(values[on]))
 
     def _go_on_from(self, before: World, storage: Storage) -> None:
         """Take over what the unit remembers of the run before, and what storage made of it."""
@@ -188,7 +193,7 @@ class World:
             through_chain(branch.twin, inputs, inputs)
 
     def samples(self, block_rows: int) -> Iterator[Samples]:
-        """What acts on the gyro at all samples in which it is on, block by block."""
+        """What acts on the gyro at all samples, block by block."""
         for block in self.timeline.blocks(block_rows):
             yield self._samples(block)
 
@@ -196,18 +201,18 @@ class World:
         """The chain's output for the next block, with contributions where they are asked for."""
         asked = [id for id in ("nominal", *self.twin.settings) if self.truth or not self._acted.get(id)]
         given = through_chain(self.twin, samples.inputs, samples.inputs, contributions=asked)
-        self._note(given.contributions)
+        self._note(given.contributions, samples.on)
         return given
 
     def logged(self, samples: Samples, output: FloatArray) -> FloatArray:
-        """The output as recorded."""
-        given = logged(self.twin, output, replace(samples.inputs, memory=self._log_memory))
+        """The output as recorded, of the samples in which the unit is on, as is `output`."""
+        given = logged(self.twin, output, chosen(samples.inputs, samples.on, self._log_memory))
         self._note(given.contributions)
         return given.output
 
     def noise_free(self, samples: Samples, output: FloatArray) -> ChainOutput:
         """The output as it would be recorded without noise, and what each logger effect changes in it."""
-        return logged(self.twin, output, replace(samples.inputs, memory=self._free_memory))
+        return logged(self.twin, output, chosen(samples.inputs, samples.on, self._free_memory))
 
     def sensed(self, name: str, samples: Samples) -> FloatArray:
         """What the sensor behind a temperature column records."""
@@ -229,7 +234,7 @@ class World:
         parts |= sensor_shares(
             self.twin, replace(samples.inputs, memory=self._share_memory).with_output(output)
         )
-        self._note(parts)
+        self._note(parts, samples.on)
         return parts
 
     def _samples(self, block: TimelineBlock) -> Samples:
@@ -239,21 +244,17 @@ class World:
         rate = block.table_rate if held.along == 1.0 else held.along * block.table_rate
         drives = self._block_drives(block, held.sense * (block.angle + block.yaw))
         on = block.powered > 0.0
-        rows = slice(None) if on.all() else on
-        drives_on = {name: values[rows] for name, values in drives.items()}
-
         if len(block):
             self._last_drives = {name: float(values[-1]) for name, values in drives.items()}
 
         def inputs(branch: Branch) -> Inputs:
             nodes = branch.nodes(block, drives, self.clock_s, self._windows)
-            nodes_on = {name: values[rows] for name, values in nodes.items()}
-            return self._inputs(branch, self.clock_s + block.time[rows], nodes_on, rate[rows], drives_on)
+            return self._inputs(branch, self.clock_s + block.time, nodes, rate, drives)
 
         without = {id: inputs(branch) for id, branch in self._without.items()}
         given = inputs(self._main)
-        noise, random = self._noise.block(len(block), rows, given)
-        return Samples(given, noise, random, without)
+        noise, random = self._noise.block(given)
+        return Samples(given, slice(None) if on.all() else on, noise, random, without)
 
     def _inputs(
         self,

@@ -23,20 +23,15 @@ PROGRAMME = {
     "steps": [
         {
             "soak at 25 degC for 20 min": [
-                "power on at minute 1",
+                "power on at minute 0",
                 "turn at 7 deg/s for 2 min, then -7 deg/s for 2 min, from minute 5",
                 "radiation at 5 Gy/h for 5 min from minute 10",
             ]
         },
-        {
-            "ramp to 40 degC at 1 degC/min": [
-                "fan off for 3 min from minute 4",
-                "power off for 2 min from minute 8",
-            ]
-        },
+        {"ramp to 40 degC at 1 degC/min": ["fan off for 3 min from minute 4"]},
     ],
 }
-"""Power, turns back to where they began, a dose, a ramp, the fan, a power cycle."""
+"""Power, turns back to where they began, a dose, a ramp, the fan."""
 NODES = (
     *("T_in", "T_out", "T_case", "T_electronics", "T_chamber", "T_top", "T_bottom"),
     *("rate", "angle", "fan"),
