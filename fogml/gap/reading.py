@@ -68,7 +68,7 @@ def rows_of(
     replayer = Replayer(run)
     counts = np.bincount(row[usable], minlength=count).astype(np.float64)
     spread = (row_s**2 - step**2) / 12.0
-    given = replace(replayer.recorded, coil=twin.coil, light=twin.light)
+    given = replace(replayer.recorded, coil=twin.coil, light=twin.light, whole_windows=True)
     if not turning(run).any():
         # Noise of a recorded rate turns nothing: no cause follows it.
         given = replace(given, table_rate=np.zeros(len(run)))

@@ -31,10 +31,8 @@ REST = {
     "shaking": 0.0,
     "dose": 0.0,
 }
-"""What a drive that is not recorded is taken to be; its effects then vanish or stay constant.
-
-Units are the run format's; ``dose`` is the absorbed radiation dose [Gy].
-"""
+"""What a drive that is not recorded is taken to be, in the run format's units; ``dose`` is the absorbed
+radiation [Gy]. Its effects then vanish or stay constant."""
 STAND_INS = {
     "T": ("T_in",),
     "T_in": ("T",),
@@ -87,6 +85,8 @@ class Inputs:
         Other recorded quantities by the run format's names, internal units, shape (n,).
     rate_window_s
         Window of rates [s]; 0 for neighbouring samples.
+    whole_windows
+        Whether DeltaT is over windows of whole samples, as in a diagnosis, and not over 64 s.
     seed
         Of what effects draw anew in each simulation; None in a replay, which does not know it.
     angle_begins_anew
@@ -118,6 +118,7 @@ class Inputs:
     drives: Mapping[str, FloatArray] = field(default_factory=dict)
     sensors: Mapping[str, Sequence[FloatArray]] = field(default_factory=dict)
     rate_window_s: float = 64.0
+    whole_windows: bool = False
     seed: int | None = None
     angle_begins_anew: bool = False
     hindsight: bool = False

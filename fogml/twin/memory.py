@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fogml.arrays import FloatArray
+from fogml.arrays import FloatArray, IndexArray
 
 Kept = TypeVar("Kept")
 _NAN = float("nan")
@@ -55,14 +55,27 @@ class Memory:
         step_x, step_t = self._steps(key, time, x, window_s)
         return np.divide(60.0 * step_x, step_t, out=np.zeros(len(step_x)), where=step_t > 0.0)
 
-    def difference(self, key: str, time: FloatArray, x: FloatArray, window_s: float) -> FloatArray:
+    def difference(
+        self, key: str, time: FloatArray, x: FloatArray, window_s: float, *, whole: bool = False
+    ) -> FloatArray:
         """Mean of x over the newest `window_s` less that over the window before, shape (n,).
 
-        Windows cut by the start, or by a gap of two windows, take what there is, halved; the first
-        sample then has difference 0.
+        Where the samples' mean times are not a window apart, as at an interval that does not divide it, the
+        difference is taken in proportion: of samples two windows apart and more the slope to the one before.
+        Windows cut by the start, or by a gap that leaves the one before empty, take what there is, halved;
+        the first sample, and the first after a gap of two windows, have difference 0.
+
+        With `whole` nothing is taken in proportion, and samples two windows apart have difference 0.
         """
+        known = self._histories.get(key, (np.empty(0), np.empty(0)))[0]
         step_x, step_t = self._steps(key, time, x, window_s)
-        return np.where(step_t < 1.999999 * window_s, step_x, 0.0) if window_s > 0.0 else step_x
+        if whole:
+            return np.where(step_t < 1.999999 * window_s, step_x, 0.0)
+        rows = np.flatnonzero(np.abs(step_t - window_s) > 1e-8 * window_s)
+        if len(rows):
+            share = _share_of_window(np.concatenate([known, time]), len(known) + rows, step_t[rows], window_s)
+            step_x[rows] *= share
+        return step_x
 
     def _steps(
         self, key: str, time: FloatArray, x: FloatArray, window_s: float
@@ -153,3 +166,16 @@ def _neighbours(time: FloatArray, x: FloatArray, first: int) -> tuple[FloatArray
     before = slice(max(first - 1, 0), -1)
     steps = (x[max(first, 1) :] - x[before], time[max(first, 1) :] - time[before])
     return steps if first else (np.concatenate([[0.0], steps[0]]), np.concatenate([[0.0], steps[1]]))
+
+
+def _share_of_window(time: FloatArray, rows: IndexArray, step_t: FloatArray, window_s: float) -> FloatArray:
+    """What differences over `step_t` [s] at `rows` are multiplied by for one over a window, same shape."""
+    gap = np.diff(time, prepend=-np.inf) >= 1.999999 * window_s
+    begins = gap.copy()
+    # Samples that lie as far apart themselves leave no gap.
+    begins[1:] &= ~gap[:-1]
+    # Windows that no gap cuts: the first sample within them has one before it. A halved one is shorter.
+    oldest = np.searchsorted(time, time[rows] - (2.0 - 1e-8) * window_s, side="right")
+    full = (oldest > 0) & ~gap[oldest] & (step_t > 0.500001 * window_s) | (step_t > window_s)
+    scaled = np.divide(window_s, step_t, out=np.ones(len(rows)), where=full)
+    return np.where(begins[rows], 0.0, scaled)

@@ -55,13 +55,16 @@ PRIOR_SD = NominalConstants(e0=500.0, k1=50.0, k2=0.5, b0=5.0, b1=0.05, b2=5e-4,
 NAMES = tuple(field.name for field in fields(NominalConstants))
 
 
-def delta_temperature(inputs: Inputs, name: str = "T") -> FloatArray:
-    """Mean of a temperature over the last 64 s less that over the 64 s before [degC], shape (n,)."""
-    key = f"delta({name})"
-    if key not in inputs.cache:
-        temperature = inputs.temperature(name)
-        inputs.cache[key] = inputs.memory.difference(key, inputs.time, temperature, DELTA_WINDOW_S)
-    return inputs.cache[key]
+def delta_temperature(inputs: Inputs) -> FloatArray:
+    """DeltaT [degC], shape (n,)."""
+    if DELTA not in inputs.cache:
+        inputs.cache[DELTA] = delta_of(inputs, DELTA, inputs.temperature())
+    return inputs.cache[DELTA]
+
+
+def delta_of(inputs: Inputs, key: str, values: FloatArray) -> FloatArray:
+    """Mean of a course over the last 64 s less that over the 64 s before; `key` names it in the memory."""
+    return inputs.memory.difference(key, inputs.time, values, DELTA_WINDOW_S, whole=inputs.whole_windows)
 
 
 def has_gradient(inputs: Inputs) -> bool:

@@ -13,7 +13,7 @@ from fogml.arrays import FloatArray
 from fogml.signals.bases import sine
 from fogml.twin.attitude import earth_rate, turned
 from fogml.twin.inputs import Inputs
-from fogml.twin.nominal import DELTA, DELTA_WINDOW_S
+from fogml.twin.nominal import DELTA, delta_of
 
 
 def slope_per_s(inputs: Inputs, key: str, x: FloatArray) -> FloatArray:
@@ -42,8 +42,7 @@ def unseen(inputs: Inputs, key: str, missed: Callable[[str], FloatArray]) -> Flo
         held[name] = missed(name)
         total += slope * held[name]
     if DELTA in inputs.slopes and "T" in held:
-        change = inputs.memory.difference(f"{key} unseen", inputs.time, held["T"], DELTA_WINDOW_S)
-        total += inputs.slopes[DELTA] * change
+        total += inputs.slopes[DELTA] * delta_of(inputs, f"{key} unseen", held["T"])
     return total
 
 

@@ -71,7 +71,7 @@ def test_information_is_that_of_the_replay_and_the_dense_covariance(rehearsed):
     white = responses(rehearsal, of)
     found = white.T @ white
     # Windows of DeltaT are integrals there and sums of samples in a replay.
-    np.testing.assert_allclose(found / np.outer(size, size), exact / np.outer(size, size), atol=0.04)
+    np.testing.assert_allclose(found / np.outer(size, size), exact / np.outer(size, size), atol=0.015)
     names = [of.parameters[i].name for i in of.wanted]
     assert names == [
         "k1",

@@ -19,6 +19,7 @@ from fogml.gap.settings import Priors
 from fogml.gap.thermal_families import hidden_node
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.nominal import NAMES
 from fogml.twin.registry import effect
 from fogml.twin.twin_file import load_twin
 
@@ -35,6 +36,24 @@ def _cycle(name="a", offset=0.0, seed=1):
 
 def _scene(*runs):
     return Scene(tuple(rows_of(run, load_twin("nominal"), 600) for run in runs), len(runs), "tactical")
+
+
+@pytest.mark.parametrize("sample_s", [1.0, 7.0, 10.0, 20.0, 45.0, 60.0, 100.0])
+def test_columns_of_the_constants_are_what_a_replay_makes_of_them(sample_s):
+    """DeltaT is over 64 s in both, however slow the samples; they differ by when it is, some seconds."""
+    time = sample_s * np.arange(max(300, int(18000.0 / sample_s)))
+    temperature = 25.0 + 20.0 * np.sin(2.0 * np.pi * time / 9000.0)
+    twin = load_twin("nominal")
+    outer = temperature + 0.3 * np.cos(time / 2000.0)
+    run = Run.from_columns("a", time=time, gyro=np.zeros(len(time)), T_in=temperature, T_out=outer)
+    rows = rows_of(run, twin, 600)
+    bare = rows.gap_of(twin)
+    for name, column in zip(NAMES, rows.constants.T, strict=True):
+        told = bare - rows.gap_of(twin.with_nominal(**{name: 1.0}))
+        # The first rows meet a start that a replay knows no more of.
+        later = rows.end_s > time[0] + 300.0
+        slack = (0.04 if name == "m" else 2e-3) * max(np.abs(told).max(), 1e-9)
+        assert column[later] == pytest.approx(told[later], abs=slack), name
 
 
 def test_spikes_and_a_limit_of_the_output_are_masked():

@@ -38,12 +38,16 @@ def fresh(inputs):
 
 
 def delta(time, x):
-    """Mean of x over the last 64 s less that over the 64 s before, by plain selection of samples."""
-    out = np.zeros(len(x))
+    """Mean of x over the last 64 s less that over the 64 s before, by plain selection of samples.
+
+    In proportion to 64 s where their mean times are not as far apart.
+    """
+    out = np.full(len(x), np.nan)
     for i in range(len(x)):
         new = (time > time[i] - 64.0) & (time <= time[i])
         old = (time > time[i] - 128.0) & (time <= time[i] - 64.0)
-        out[i] = x[new].mean() - x[old].mean() if old.any() else np.nan
+        if time[0] <= time[i] - 128.0 and old.any():
+            out[i] = 64.0 * (x[new].mean() - x[old].mean()) / (time[new].mean() - time[old].mean())
     return out
 
 

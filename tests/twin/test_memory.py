@@ -54,13 +54,13 @@ def test_rate_and_difference_by_definition(clock: str) -> None:
     x = temperature(time)
     step_x, step_t = two_windows(time, x, 64.0)
     told = np.where(step_t < 128.0, step_x, 0.0)
-    assert Memory().difference("a", time, x, 64.0) == pytest.approx(told, abs=1e-11)
+    assert Memory().difference("a", time, x, 64.0, whole=True) == pytest.approx(told, abs=1e-11)
     wanted = np.divide(60.0 * step_x, step_t, out=np.zeros_like(x), where=step_t > 0.0)
     # Times near 1.7e9 s have 2e-7 s of rounding themselves.
     assert Memory().rate("a", time, x, 64.0) == pytest.approx(wanted, abs=1e-6 if clock == "late" else 1e-11)
 
 
-@pytest.mark.parametrize("clock", ["regular", "uneven", "gaps"])
+@pytest.mark.parametrize("clock", ["regular", "gaps"])
 def test_difference_is_the_features_where_their_windows_are_full(clock: str) -> None:
     time = CLOCKS[clock]
     run = Run(name="r", columns={"time": time, "gyro": np.zeros(3000), "T": temperature(time)})
@@ -68,6 +68,37 @@ def test_difference_is_the_features_where_their_windows_are_full(clock: str) -> 
     assert full.sum() > 2000
     found = Memory().difference("a", time, temperature(time), 64.0)
     assert found[full] == pytest.approx(values[full, 0], abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    "sample_s", [1.0, 7.0, 10.0, 20.0, 32.0, 45.0, 60.0, 64.0, 100.0, 127.0, 128.0, 200.0]
+)
+def test_difference_is_over_its_window_however_slow_the_samples(sample_s: float) -> None:
+    """That of a course at 1 s, read where the samples are."""
+    fine, slow = np.arange(36001.0), sample_s * np.arange(36000.0 // sample_s)
+
+    def course(time: FloatArray) -> FloatArray:
+        return 30.0 * np.sin(time / 1500.0) + 10.0 * np.cos(time / 2500.0)
+
+    true = np.interp(slow, fine, Memory().difference("a", fine, course(fine), 64.0))
+    found = Memory().difference("a", slow, course(slow), 64.0)
+    later = slow > 400.0
+    assert found[later] == pytest.approx(true[later], abs=0.03 * np.abs(true).max())
+    assert found[later] @ true[later] == pytest.approx(true[later] @ true[later], rel=2e-3)
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_difference_of_a_ramp_is_what_it_climbs_in_a_window(clock: str) -> None:
+    time = CLOCKS[clock]
+    found = Memory().difference("a", time, 0.5 * (time - time[0]), 64.0)
+    assert found[0] == 0.0
+    # In what a gap leaves of the windows the difference is of halves, as at the start.
+    halved = np.zeros(3000, dtype=np.bool_)
+    if clock == "gaps":
+        halved = (time > 1090.0) & (time < 1156.0) | (time > 2580.0) & (time < 2720.0)
+    assert found[(time - time[0] > 140.0) & ~halved] == pytest.approx(32.0, rel=1e-6)
+    # A gap of 500 s begins the windows anew.
+    assert np.count_nonzero(found == 0.0) == (2 if clock == "gaps" else 1)
 
 
 def test_rate_of_a_ramp_is_exact_from_the_second_sample_on_and_over_gaps() -> None:
@@ -87,6 +118,7 @@ def in_blocks(kind: str, time: FloatArray, edges: list[int]) -> FloatArray:
         pieces.append(
             {
                 "rate": lambda t=t, v=v: memory.rate("a", t, v, 64.0),
+                "difference": lambda t=t, v=v: memory.difference("a", t, v, 64.0),
                 "neighbours": lambda t=t, v=v: memory.rate("a", t, v, 0.0),
                 "lag": lambda t=t, v=v: memory.lag("a", t, v, 200.0),
                 "lags": lambda t=t, v=v: memory.lag("a", t, v, 200.0 + v),
@@ -99,7 +131,7 @@ def in_blocks(kind: str, time: FloatArray, edges: list[int]) -> FloatArray:
     return np.concatenate(pieces)
 
 
-KINDS = ["rate", "neighbours", "lag", "lags", "play", "total", "previous", "first"]
+KINDS = ["rate", "difference", "neighbours", "lag", "lags", "play", "total", "previous", "first"]
 
 
 @settings(max_examples=60, deadline=None)

@@ -255,6 +255,19 @@ def test_replay_of_a_noise_free_run_is_the_simulation_however_slow_its_samples(s
     np.testing.assert_allclose(replay(twin, made.run), made.run.gyro, atol=1e-9)
 
 
+@pytest.mark.parametrize("every", [10, 20, 45, 60, 100, 128, 200])
+def test_a_run_that_kept_few_samples_has_the_gyros_own_windows_of_64_s(every):
+    """Replayed from one sample in so many of a run at 1 s: what the gyro put out there."""
+    twin = Twin(plant=load_twin("tactical").plant).with_nominal(m=2.0)
+    run = simulate("multi-point-cycle", twin).run
+    few = Run("few", {name: values[::every] for name, values in run.columns.items()}, run.facts)
+    later = few.time > 400.0
+    found, true = replay(twin, few)[later], few.gyro[later]
+    assert np.abs(true).max() > 1.9
+    assert found @ true == pytest.approx(true @ true, rel=3e-3)
+    assert np.sqrt(np.mean((found - true) ** 2)) < 0.03 * np.sqrt(np.mean(true**2))
+
+
 @pytest.mark.parametrize("sample_s", [1.0, 30.0])
 def test_noisy_readings_are_still_told_from_quiet_ones(sample_s):
     twin = replace(load_twin("tactical"), settings={})
