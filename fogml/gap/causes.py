@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fogml.arrays import BoolArray
 from fogml.gap.cards import Card, beside_others
-from fogml.gap.field import Field
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import LinearGaussian
@@ -57,7 +55,8 @@ def _by_run(found: Inference, every: Foretold, cause: Cause, amplitude: float) -
     """Amplitude that each run asks for beside all else, which is anew in each; the form as found."""
     held = found.field
     rest = held.design(m for m in every.members if m not in cause.members)
-    course = held.design(every.members) @ np.where(_columns_of(held, every, cause), every.posterior.mean, 0.0)
+    own = [at for m, at in zip(every.members, held.places(every.members)) if m in cause.members]
+    course = np.sum([held.design(every.members)[:, at] @ every.posterior.mean[at] for at in own], axis=0)
     rows = []
     for r, span in zip(found.scene.fit, found.setting.spans):
         alone = LinearGaussian.of(held.base.data[span]).beside(rest[span])
@@ -68,13 +67,6 @@ def _by_run(found: Inference, every: Foretold, cause: Cause, amplitude: float) -
             se = float(np.hypot(size**-0.5, found.setting.priors.form_error * scale))
             rows.append(RunAmplitude(r.run.name, amplitude * scale, abs(amplitude) * se))
     return tuple(rows)
-
-
-def _columns_of(held: Field, every: Foretold, cause: Cause) -> BoolArray:
-    """Which coefficients of causes together are one cause's, shape (q,)."""
-    told = [np.zeros(held.fixed.shape[1], dtype=np.bool_)]
-    told += [np.full(held.block(m.node).shape[1], m in cause.members) for m in every.members]
-    return np.concatenate(told)
 
 
 def since(scene: Scene, by_run: Sequence[RunAmplitude], begun: Onset | None) -> tuple[RunAmplitude, ...]:

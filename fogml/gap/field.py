@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -133,6 +133,11 @@ class Field:
     def design(self, members: Iterable[Member]) -> FloatArray:
         """Fixed block and members with their sizes, shape (n, q)."""
         return np.concatenate([self.fixed, *(m.size * self.block(m.node) for m in members)], axis=1)
+
+    def places(self, members: Iterable[Member]) -> list[slice]:
+        """Which columns of `design` are each member's."""
+        widths = (self.at[m.node].stop - self.at[m.node].start for m in members)
+        return [slice(a, b) for a, b in pairwise(accumulate(widths, initial=self.fixed.shape[1]))]
 
     def beside(self, members: Iterable[Member]) -> LinearGaussian:
         """The data beside the fixed block and members with their sizes."""

@@ -123,13 +123,8 @@ class Foretold:
 
     def part(self, run: int, member: Member, coefficients: FloatArray) -> FloatArray:
         """What one member makes at coefficients of shape (q, ...), shape (m, ...)."""
-        at = self.found.field.fixed.shape[1]
-        for m in self.members:
-            width = self.found.field.block(m.node).shape[1]
-            if m is member:
-                return np.asarray(self.design(run)[:, at : at + width] @ coefficients[at : at + width])
-            at += width
-        raise ValueError("not a member")
+        at = self.found.field.places(self.members)[self.members.index(member)]
+        return np.asarray(self.design(run)[:, at] @ coefficients[at])
 
     def drawn(self, rng: np.random.Generator) -> FloatArray:
         """The mean of the coefficients, then draws from their posterior, shape (q, 1 + draws)."""
