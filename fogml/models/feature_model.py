@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from contextlib import nullcontext
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, ClassVar, Self
@@ -160,7 +161,7 @@ class FeatureModel(DriftModel):
 
     def _out_of_fold(self, fitted: TrainingTable, held: TrainingTable) -> FloatArray:
         """Drift at rows of atoms, of the model fitted to others and limited to their box."""
-        features = parse_features(self.features_.text)
+        features = copy(self.features_)
         learn_box(features, [fitted.X])
         regressor = self._refitted(replace(fitted, X=features.compose(fitted.X)))
         full = np.ones(len(held), dtype=np.bool_)

@@ -18,6 +18,7 @@ gyro to its own output; such runs are refused.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import partial
 from typing import Any, ClassVar, Self
 
@@ -265,7 +266,7 @@ class JointModel(DriftModel):
 
     def _out_of_fold(self, fitted: TrainingTable, held: TrainingTable) -> FloatArray:
         """Rate at rows of output and atoms, of the model fitted to others and limited to their box."""
-        features = parse_features(self.features_.text)
+        features = copy(self.features_)
         learn_box(features, [fitted.X[:, 1:]])
         full = np.ones(len(held), dtype=np.bool_)
         limited, _ = features.limit(held.X[:, 1:], full, linear=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -82,6 +83,11 @@ class RunRows:
     y: FloatArray
     time_s: FloatArray
     notes: tuple[str, ...] = ()
+
+    @cached_property
+    def interval_s(self) -> float:
+        """Median time from row to row [s]; a second of a single one."""
+        return float(np.median(np.diff(self.time_s))) if len(self.time_s) > 1 else 1.0
 
 
 def training_table(runs: Sequence[Run], features: Features, max_rows: int | None = None) -> TrainingTable:
@@ -230,16 +236,12 @@ def row_count(rows: Sequence[RunRows]) -> int:
 
 def recorded_s(rows: Sequence[RunRows]) -> float:
     """Time that the rows stand for [s]: their number times the median interval, run by run."""
-    return float(sum(len(part.y) * _sample_s(part.time_s) for part in rows))
+    return float(sum(len(part.y) * part.interval_s for part in rows))
 
 
 def longest_interval_s(rows: Sequence[RunRows]) -> float:
     """Longest of the runs' median intervals between rows [s]."""
-    return max(_sample_s(part.time_s) for part in rows)
-
-
-def _sample_s(time_s: FloatArray) -> float:
-    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    return max(part.interval_s for part in rows)
 
 
 def _averages(

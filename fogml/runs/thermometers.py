@@ -218,7 +218,7 @@ class _Averaging:
     def of(cls, time: FloatArray, averaging_s: float) -> _Averaging:
         if len(time) == 0:
             return cls(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0), np.empty(0))
-        starts = np.flatnonzero(np.diff((time - time[0]) // averaging_s, prepend=-1.0))
+        starts = np.flatnonzero(np.diff(np.floor((time - time[0]) / averaging_s), prepend=-1.0))
         counts = np.diff(np.append(starts, len(time)))
         return cls(starts, counts, np.add.reduceat(time, starts) / counts, np.diff(time))
 
