@@ -28,10 +28,10 @@ _SPELLINGS = {
     "rad": ("radian", "radians"),
     "deg/h": ("dph", "deg*h-1", "degh-1", "deg*h^-1", "degh^-1"),
     "deg/s": ("dps", "deg*s-1", "degs-1", "deg*s^-1", "degs^-1"),
-    "rad/s": ("rps", "rad*s-1", "rads-1", "rad*s^-1", "rads^-1"),
+    "rad/s": ("rad*s-1", "rads-1", "rad*s^-1", "rads^-1"),
     "deg/min": (),
     "mdeg/s": ("mdps",),
-    "mrad/s": ("mrps",),
+    "mrad/s": (),
     "arcsec/s": ('"/s', "arcsec/sec", "as/s"),
     "arcsec/h": ('"/h', "arcsec/hr", "arcsec/hour", "as/h"),
     "degC": ("c", "celsius", "degcelsius", "centigrade"),
@@ -53,6 +53,8 @@ _PLAIN_UNIT = re.compile(r"[A-Za-z_]{1,20}(/[A-Za-z_]{1,20})?\Z")
 _OF_PINT = {"g": "standard_gravity", "G": "gauss", "%": "percent", "degC": "degree_Celsius", "h": "hour"}
 # Nobody counts in hundreds of hours: deg/hh, which pint takes for that, is a slip.
 _MULTIPLE_OF_TIME = re.compile(r"(?!arc)[a-z]+(hour|minute|day|week|month|year)\Z")
+# Degrees in German, gon elsewhere, and billions of radians to pint.
+_AMBIGUOUS = re.compile(r"grads?\b", re.IGNORECASE)
 _NAMES_OF_ANGLES = re.compile(r"[a-z]*(degree|radian|arcminute|arcsecond|turn|grade)\Z")
 
 
@@ -90,7 +92,7 @@ def converted(unit: str, internal: str) -> tuple[float, float] | None:
     """
     plain = signs(unit).replace("°", "deg").replace("µ", "u")
     plain = canonical_unit(plain)
-    if not _PLAIN_UNIT.match(plain) or "count" in plain:
+    if not _PLAIN_UNIT.match(plain) or _AMBIGUOUS.match(plain) or "count" in plain:
         return None
     registry = _registry()
     try:

@@ -142,7 +142,7 @@ def _known_name(name: str) -> str:
 
 
 def _plain(name: str) -> str:
-    return re.sub(r"[\s_-]", "", signs(name).lower())
+    return re.sub(r"[\s_.-]", "", signs(name).lower())
 
 
 def _parts(cell: str) -> tuple[str, str | None]:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.runs.columns import converted
+from fogml.runs.columns import canonical_unit, conversion, converted
+from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.profiles import import_recording
 from fogml.runs.reading import read_run
 
@@ -36,6 +37,17 @@ def test_units_by_what_they_are(unit: str, internal: str, factor: float) -> None
 )
 def test_multiples_of_hours_and_minutes_are_slips(unit: str, internal: str) -> None:
     assert converted(unit, internal) is None
+
+
+@pytest.mark.parametrize("unit", ["Grad/h", "grad/s", "rps", "mrps"])
+def test_units_of_two_meanings_are_refused(unit: str) -> None:
+    """Grad is a degree in German and 0.9 of one elsewhere; rps is radians or revolutions a second."""
+    with pytest.raises(InputError, match="not accepted here"):
+        conversion("gyro", canonical_unit(unit), "log.csv")
+
+
+def test_a_point_after_an_abbreviation_is_no_part_of_the_name() -> None:
+    assert canonical_cells(["Time (s)", "Gyro (deg/h)", "Temp. (°C)"])[2] == "T [degC]"
 
 
 @pytest.mark.parametrize("unit", ["arcsec", "deg", "urad"])
