@@ -179,22 +179,32 @@ def set_up_notes(
     return told
 
 
-def angle_notes(run: Run, times_s: FloatArray, turned_deg: FloatArray, tolerance_deg: float) -> list[str]:
-    """A note where the table's recorded angle goes another way than the positions say.
+def angle_notes(
+    run: Run, times_s: FloatArray, turned_deg: FloatArray, tolerance_deg: float, azimuth_deg: float
+) -> list[str]:
+    """A note where the table's angle goes another way than the positions say, or alone tells them.
 
     Parameters
     ----------
     run
-        With a column ``position`` and maybe ``angle``.
+        With a column ``position``, ``angle``, or both.
     times_s
         Middle of each stay.
     turned_deg
         Angle of its position, clockwise.
     tolerance_deg
         How far the table may be from it.
+    azimuth_deg
+        What was found. An angle that counts the other way mirrors it, and the output can't tell.
     """
-    if "position" not in run.columns or "angle" not in run.columns:
+    if "angle" not in run.columns:
         return []
+    if "position" not in run.columns:
+        return [
+            "the table's angle alone tells the positions, and is taken to count counter-clockwise, seen from "
+            f"above: of one that counts clockwise the azimuth is {-azimuth_deg % 360.0:.2f} deg, which the "
+            "output can't show"
+        ]
     # The table's angle counts counter-clockwise.
     recorded = -np.interp(times_s, run.time, run.columns["angle"])
     recorded, turned = recorded - recorded[0], turned_deg - turned_deg[0]

@@ -132,7 +132,7 @@ def north_from_positions(
     notes = [
         *fix_notes(fix, covariance, left),
         *set_up_notes(run, fix, covariance, latitude_deg),
-        *angle_notes(run, stays.times, angles * SENSES[sense], angle_tolerance_deg),
+        *angle_notes(run, stays.times, angles * SENSES[sense], angle_tolerance_deg, fix.azimuth_deg),
     ]
     return replace(fix, notes=tuple(notes))
 
@@ -233,9 +233,14 @@ def _stays(run: Run, order_deg: Sequence[float], sense: str, settle_s: float, to
     missing = sorted(set(range(1, count + 1)) - set(position[position > 0].astype(int).tolist()))
     if missing:
         named = ", ".join(str(number) for number in missing)
-        column = "position" if "position" in run.columns else "angle"
+        column, where = "position", ""
+        if "position" not in run.columns:
+            column = "angle"
+            at = ", ".join(f"{angle % 360.0:g}" for angle in -SENSES[sense] * np.asarray(order_deg))
+            where = f", where it rests within {tolerance_deg:g} deg of {at} deg: --order states other angles"
         raise InputError(
-            f"{run.name}, column '{column}': no samples in position {named}; all of 1 to {count} are needed"
+            f"{run.name}, column '{column}': no samples in position {named}; "
+            f"all of 1 to {count} are needed{where}"
         )
     edges = np.concatenate([[0], np.flatnonzero(np.diff(position) != 0.0) + 1, [len(position)]])
     stay = np.repeat(np.arange(len(edges) - 1), np.diff(edges))

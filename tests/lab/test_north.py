@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -260,6 +261,30 @@ def test_a_table_that_stands_still_is_told_by_its_own_column() -> None:
     columns["angle"] = np.zeros(2700)
     with pytest.raises(InputError, match=r"'angle': no samples in position 2, 3, 4"):
         north_from_positions(Run("still", columns, Facts(latitude=40.0)))
+
+
+@pytest.mark.parametrize("counts", [-1.0, 1.0], ids=["clockwise", "counter-clockwise"])
+def test_an_angle_that_counts_either_way_is_told_with_the_azimuth_of_the_other(counts: float) -> None:
+    """The output is the same for both: the run's own azimuth, 33 deg, is found or stands in the note."""
+    columns = dict(own_seek(1, 33.0, 40.0, walk=0.0, drift=np.zeros_like).columns)
+    del columns["position"]
+    columns["angle"] = counts * columns["angle"]
+    fix = north_from_positions(Run("angle", columns, Facts(latitude=40.0)))
+    told = float(re.search(r"of one that counts clockwise the azimuth is (\S+) deg", " ".join(fix.notes))[1])
+    right, mirrored = (told, fix.azimuth_deg) if counts < 0.0 else (fix.azimuth_deg, told)
+    assert (right, mirrored) == pytest.approx((33.0, 327.0), abs=0.02)
+
+
+def test_a_table_whose_angles_begin_elsewhere_is_told_where_they_were_looked_for() -> None:
+    columns = dict(own_seek(1, 12.0, 40.0, walk=0.0, drift=np.zeros_like).columns)
+    del columns["position"]
+    columns["angle"] = columns["angle"] + 10.0
+    run = Run("elsewhere", columns, Facts(latitude=40.0))
+    with pytest.raises(InputError, match=r"within 0\.5 deg of 0, 270, 180, 90 deg: --order"):
+        north_from_positions(run)
+    # Angles of the table are clockwise ones of the other sign, and the azimuth that of its zero.
+    fix = north_from_positions(run, order_deg=(-10.0, 80.0, 170.0, 260.0))
+    assert fix.azimuth_deg == pytest.approx(22.0, abs=0.01)
 
 
 @pytest.mark.parametrize("latitude", [89.6, -89.85])
