@@ -140,13 +140,16 @@ def slew(run: Run, plateaus: Plateaus, scale_factor: float = 1.0) -> Slew | None
     rows = slice(int(plateaus.stop[place]) - 1, int(plateaus.stop[place + 1]))
     time = run.time[rows]
     table = (3600.0 * (run.rate[rows] - run.rate[rows.start])) / height
-    output = (run.gyro_deg_h[rows] - plateaus.output[place]) / (scale_factor * height)
+    # Of the output's own step, which a saturated one has smaller than the table's.
+    risen = float(plateaus.output[place + 1] - plateaus.output[place])
+    if risen == 0.0:
+        return None
+    output = (run.gyro_deg_h[rows] - plateaus.output[place]) / risen
     got, given = _flank(time, output), _flank(time, table)
-    step = abs(height) / 3600.0
-    white = plateaus.error[place] * math.sqrt(plateaus.stop[place] - plateaus.start[place]) / abs(height)
-    straight = got.rows >= LEAST_FLANK_ROWS and got.bent < STRAIGHT + white / scale_factor
-    limited = straight and got.slope < FOLLOWS * given.slope
-    return Slew(step * got.slope, step * given.slope, limited)
+    white = plateaus.error[place] * math.sqrt(plateaus.stop[place] - plateaus.start[place]) / abs(risen)
+    straight = got.rows >= LEAST_FLANK_ROWS and got.bent < STRAIGHT + white
+    slopes = abs(risen) / scale_factor / 3600.0 * got.slope, abs(height) / 3600.0 * given.slope
+    return Slew(*slopes, straight and slopes[0] < FOLLOWS * slopes[1])
 
 
 class _Flank(NamedTuple):

@@ -12,6 +12,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted
 from fogml.numerals import short
+from fogml.runs.coarse_output import coarse_output
 from fogml.runs.findings import DEAD, SATURATION, Finding, dead_words
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
@@ -60,6 +61,8 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         The gyro stays at its greatest or least value for 3 samples on end, or is there in 10 in
         all, and over 3 times more often than at the value next to it, so that noise is cut off
         there; not where a quiet output rests at other values as well.
+    ``coarse_output``
+        The output is rounded to steps that its noise does not fill (`coarse_output`).
     ``outliers``
         Gyro samples over 8 robust sigma off the median of the five about them (`find_outliers`).
     ``small_temperature_span``
@@ -77,6 +80,7 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         stuck,
         _dead,
         _saturated,
+        coarse_output,
         _outliers,
         _span,
     )

@@ -11,6 +11,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.intervals import Z90
 from fogml.numerals import percent, short
+from fogml.runs.coarse_output import hardly_moved
 from fogml.runs.noise_series import HOLD_ROWS, NoiseSeries
 from fogml.runs.run import Run
 from fogml.runs.steps import recorded_step
@@ -20,14 +21,10 @@ from fogml.signals.whiteness import Stationarity
 
 DOUBT = 1e-3
 """Chance of a warning that a right model, or a steady run, gets."""
-DITHERED = 0.6
-"""Standard deviation of samples, in steps of the output, from which on rounding to those makes white noise:
-an angle with 0.4 steps of noise a sample, and the rounding itself (simulated)."""
 ROUNDED = 0.01
 """Share of N that rounding makes from which it is told."""
 MOST_LINES = 5
 """Sinusoids that are listed."""
-_BLOCK = 32
 _URAD = np.pi / 180.0 / 3600.0 * 1e6
 
 
@@ -124,8 +121,7 @@ def coarse_steps(series: NoiseSeries) -> list[dict[str, str]]:
     """A warning where samples hardly leave a step of the output, so that its rounding is no white noise."""
     values = max(series.stretches, key=len)[:HOLD_ROWS]
     step = recorded_step(values)
-    blocks = values[: len(values) // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
-    if step == 0.0 or len(blocks) == 0 or float(np.median(blocks.std(axis=1))) >= DITHERED * step:
+    if not hardly_moved(values, step):
         return []
     angle = step * series.new_s
     message = (
