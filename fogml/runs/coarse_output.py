@@ -46,9 +46,9 @@ def coarse_output(run: Run) -> Iterator[Finding]:
     if not hardly_moved(values, step, FILLED) or _is_counted(values):
         return
     message = (
-        f"'gyro' comes in steps, of {short(step)} deg/h as far as they show, and its noise hardly moves it from "
-        "one to the next: means, and what is made of them, may be off by up to half a step, which no interval holds; record "
-        "it finer, or the angle that is counted"
+        f"'gyro' comes in steps, of {short(step)} deg/h as far as they show, and its noise hardly moves it "
+        "from one to the next: means, and what is made of them, may be off by up to half a step, which no "
+        "interval holds; record it finer, or the angle that is counted"
     )
     yield Finding("coarse_output", message, column="gyro", count=len(run))
 

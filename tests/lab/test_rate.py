@@ -92,6 +92,20 @@ def test_a_scale_factor_over_temperature_is_no_nonlinearity() -> None:
     assert not rate_json([bare], source="a run")["synthetic"]
 
 
+@pytest.mark.parametrize("scale", [1.0, -1.0])
+def test_the_slew_of_a_saturated_output_is_the_tables_and_no_rows(scale: float) -> None:
+    """From 300 to -300 deg/s at 50 deg/s2, of which the output follows 250 of either side."""
+    commanded = np.repeat([0.0, 100.0, -100.0, 300.0, -300.0, 0.0], 600)
+    rate = np.zeros(len(commanded))
+    for row in range(1, len(rate)):
+        rate[row] = rate[row - 1] + np.clip(commanded[row] - rate[row - 1], -5.0, 5.0)
+    gyro = scale * 3600.0 * np.clip(rate, -250.0, 250.0) + np.random.default_rng(0).standard_normal(len(rate))
+    run = Run("run", {"time": 0.1 * np.arange(len(rate)), "gyro": gyro, "rate": rate}, Facts())
+    told = rate_json([run], source="a run")["slew"]
+    assert told["output_deg_s2"] == pytest.approx(50.0, rel=0.01)
+    assert told["table_deg_s2"] == pytest.approx(50.0, rel=0.01) and not told["limited"]
+
+
 def test_a_lag_is_no_slew_limit() -> None:
     twin = Twin().with_effect("loop_gain", 5e-3, power_slope=0.0, leak_time=1e9)
     told = rate_json(rate_runs(twin, frequencies_hz=np.array([10.0, 20.0])), source="twin", twin=twin)
