@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray
+from fogml.arrays import FloatArray
 from fogml.runs.steps import to_steps
 from fogml.twin.effect import (
     BiasEffect,
@@ -177,16 +177,6 @@ def sensor_shares(twin: Twin, inputs: Inputs) -> dict[str, FloatArray]:
     return {d.id: s.amplitude * d.signature(given, **s.shape) for d, s in found}
 
 
-def logged(twin: Twin, output: FloatArray, inputs: Inputs) -> ChainOutput:
-    """The output as it is recorded [deg/h], and what each logger effect changes in it."""
-    parts: dict[str, FloatArray] = {}
-    for declared, setting in twin.logging:
-        before = output
-        output = declared.record(before, inputs.with_output(before), setting.amplitude, **setting.shape)
-        parts[declared.id] = output - before
-    return ChainOutput(output, parts)
-
-
 def sensed(
     twin: Twin, name: str, temperature: FloatArray, inputs: Inputs, rng: Mapping[str, np.random.Generator]
 ) -> FloatArray:
@@ -217,20 +207,6 @@ def _falsified(
 def fresh(inputs: Inputs) -> Inputs:
     """The same samples with no memory of others and nothing worked out yet."""
     return replace(inputs, memory=Memory(), cache={})
-
-
-def chosen(inputs: Inputs, rows: slice | BoolArray, memory: Memory) -> Inputs:
-    """Some of the samples, with a memory of their own."""
-    if isinstance(rows, slice) and rows == slice(None):
-        return replace(inputs, memory=memory)
-    temperatures, drives = (
-        {name: values[rows] for name, values in columns.items()}
-        for columns in (inputs.temperatures, inputs.drives)
-    )
-    time, rate = inputs.time[rows], inputs.table_rate[rows]
-    return replace(
-        inputs, time=time, temperatures=temperatures, table_rate=rate, drives=drives, memory=memory, cache={}
-    )
 
 
 class Branch:

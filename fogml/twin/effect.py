@@ -237,6 +237,10 @@ class LoggerEffect(Effect):
     def record(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
         """The output as logged [deg/h], shape (n,)."""
 
+    def ahead_s(self, hours: float, amplitude: float, **shape: float) -> float:
+        """How far beyond a sample it looks in a recording of so many hours [s]."""
+        return 0.0
+
     @property
     def in_proportion(self) -> bool:
         return False

@@ -16,11 +16,12 @@ from fogml.runs.facts import Direction, Facts, Heading
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.steps import noisy_beyond
 from fogml.twin.attitude import earth_field
-from fogml.twin.chain import hidden, logged, through_chain
+from fogml.twin.chain import hidden, through_chain
 from fogml.twin.effect import Effect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import REST, STAND_INS, Inputs
 from fogml.twin.plant.fit import estimate_nodes, recorded_power
 from fogml.twin.plant.heat import PowerWindows, windows_since
+from fogml.twin.recorder import logged
 from fogml.twin.truth import Truth
 from fogml.twin.twin import RATE_WINDOW_S, EffectSetting, Twin
 

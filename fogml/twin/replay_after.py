@@ -12,13 +12,14 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-from fogml.twin.chain import chosen, logged, through_chain
+from fogml.twin.chain import through_chain
 from fogml.twin.effect import Effect
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.plant.fit import EstimateState, estimate_nodes
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.plant.network import PlantState, ThermalNetwork
+from fogml.twin.recorder import chosen, logged
 from fogml.twin.replay import Replayer
 from fogml.twin.twin import EffectSetting, Twin
 

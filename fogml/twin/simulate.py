@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -17,11 +18,12 @@ from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.chain import ChainOutput
 from fogml.twin.programme import Programme, load_programme
+from fogml.twin.recorder import Samples, Worked, looks_ahead_s
 from fogml.twin.replay_after import Storage
 from fogml.twin.truth import TIME_ON, Truth, written_time_on
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
-from fogml.twin.world import Samples, World
+from fogml.twin.world import World
 
 Done = TypeVar("Done")
 DEFAULT_COLUMNS = (
@@ -254,26 +256,33 @@ def world_of(
 
 def _blocks(world: World, then: Callable[[dict[str, FloatArray], Truth | None], Done]) -> Iterator[Done]:
     """What `then` makes of the recorded columns, and of the truth, block after block."""
-    blocks = world.samples(BLOCK_ROWS)
+    clock = world.timeline
+    ahead_s = looks_ahead_s(world.twin, clock.total_hours)
+    rows = max(BLOCK_ROWS, math.ceil(ahead_s / clock.sample_s))
+    blocks = world.samples(rows)
 
-    def record(samples: Samples, chain: ChainOutput) -> Done:
-        return then(*_recorded(world, samples, chain))
+    def record(samples: Samples, chain: ChainOutput, later: Worked | None = None) -> Done:
+        return then(*_recorded(world, samples, chain, later if ahead_s else None))
 
-    if len(world.timeline) <= BLOCK_ROWS:
+    if len(clock) <= rows:
         # A thread takes longer to start than a single block to work out.
         yield from (record(samples, world.output(samples)) for samples in blocks)
         return
     # Beside a block's output, the longest part: what acts on the next, what is recorded of the one before.
     with ThreadPoolExecutor(max_workers=2) as beside:
         ahead, behind = beside.submit(next, blocks, None), None
+        held: Worked | None = None
         while (samples := ahead.result()) is not None:
             ahead = beside.submit(next, blocks, None)
             chain = world.output(samples)
             if behind is not None:
                 yield behind.result()
-            behind = beside.submit(record, samples, chain)
+            behind = None if held is None else beside.submit(record, *held, (samples, chain))
+            held = samples, chain
         if behind is not None:
             yield behind.result()
+        if held is not None:
+            yield record(*held)
 
 
 def _whole(counts: FloatArray) -> FloatArray:
@@ -283,12 +292,12 @@ def _whole(counts: FloatArray) -> FloatArray:
 
 
 def _recorded(
-    world: World, samples: Samples, chain: ChainOutput
+    world: World, samples: Samples, chain: ChainOutput, later: Worked | None
 ) -> tuple[dict[str, FloatArray], Truth | None]:
     inputs, on = samples.inputs, samples.on
     # On the run's own clock.
     time = inputs.time[on] - world.clock_s if world.clock_s else inputs.time[on]
-    gyro = world.logged(samples, (chain.output + samples.noise)[on])
+    gyro = world.logged((samples, chain), later)
     if world.counts_per_deg_h is not None:
         gyro = _whole(gyro * world.counts_per_deg_h)
     recorded = {"time": time, "gyro": gyro}
@@ -303,7 +312,7 @@ def _recorded(
         recorded["time_on"] = inputs.time_on_s[on]
     if not world.truth:
         return recorded, None
-    free = world.noise_free(samples, chain.output[on])
+    free = world.noise_free((samples, chain), later)
     others = world.other_contributions(samples, chain.output)
 
     def kept(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

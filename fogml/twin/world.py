@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -18,9 +18,7 @@ from fogml.twin.chain import (
     Branch,
     ChainOutput,
     RandomErrors,
-    chosen,
     hidden,
-    logged,
     sensed,
     sensor_shares,
     through_chain,
@@ -30,6 +28,7 @@ from fogml.twin.memory import Memory
 from fogml.twin.noise import Streams
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.programme import Programme
+from fogml.twin.recorder import Samples, Worked, recorded_output
 from fogml.twin.replay_after import (
     Storage,
     later_s,
@@ -56,23 +55,6 @@ _ALL_DRIVES = (
     "B_y",
     "B_z",
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Samples of a block: what acts on the gyro, and the noise that comes on top [deg/h].
-
-    A winding remembers, and a sensor follows, what temperature does while the unit is off. `on` are the
-    samples in which it is on, which alone are recorded. `random` holds each random effect's part of the
-    noise, where contributions are asked for, and `without`, for each thermal effect, the inputs as they would
-    be without it.
-    """
-
-    inputs: Inputs
-    on: slice | BoolArray
-    noise: FloatArray
-    random: dict[str, FloatArray]
-    without: dict[str, Inputs]
 
 
 class World:
@@ -204,15 +186,15 @@ class World:
         self._note(given.contributions, samples.on)
         return given
 
-    def logged(self, samples: Samples, output: FloatArray) -> FloatArray:
-        """The output as recorded, of the samples in which the unit is on, as is `output`."""
-        given = logged(self.twin, output, chosen(samples.inputs, samples.on, self._log_memory))
+    def logged(self, now: Worked, later: Worked | None) -> FloatArray:
+        """The output as recorded, of the samples in which the unit is on."""
+        given = recorded_output(self.twin, self._log_memory, now, later, noisy=True)
         self._note(given.contributions)
         return given.output
 
-    def noise_free(self, samples: Samples, output: FloatArray) -> ChainOutput:
+    def noise_free(self, now: Worked, later: Worked | None) -> ChainOutput:
         """The output as it would be recorded without noise, and what each logger effect changes in it."""
-        return logged(self.twin, output, chosen(samples.inputs, samples.on, self._free_memory))
+        return recorded_output(self.twin, self._free_memory, now, later, noisy=False)
 
     def sensed(self, name: str, samples: Samples) -> FloatArray:
         """What the sensor behind a temperature column records."""

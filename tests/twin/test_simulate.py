@@ -38,10 +38,12 @@ def everything(**more) -> Twin:
     return twin
 
 
-def test_blocks_do_not_matter(monkeypatch):
+@pytest.mark.parametrize("skew", [2.4, -60.0, -300.0], ids="late {}".format)
+def test_blocks_do_not_matter(monkeypatch, skew):
+    """Nor where a clock runs ahead, by more than a block too."""
     twin = everything(
         noise=NoiseConstants(N=0.01, B=0.1, K=0.1), sensors=Sensors(SensorErrors(0.01, 0.01, 20.0))
-    )
+    ).with_effect("logger_skew", skew, growth=0.3)
     whole = simulate(QUICK, twin, seed=4, truth=True)
     monkeypatch.setattr(simulating, "BLOCK_ROWS", 333)
     pieces = simulate(QUICK, twin, seed=4, truth=True)

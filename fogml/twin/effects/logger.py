@@ -49,8 +49,8 @@ class LoggerSkew(LoggerEffect):
     def record(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
         """The output as logged [deg/h], linear between samples, shape (n,).
 
-        What lies before the first sample is taken for the first one; what lies after the last one of
-        these samples, where d is negative, for the last one.
+        What lies before the first sample is taken for the first one, what lies after the last one, where d is
+        negative, for that.
         """
         delay = amplitude * self._growing(inputs, shape["growth"])
         span = 2.0 * float(np.abs(delay).max(initial=0.0))
@@ -58,6 +58,9 @@ class LoggerSkew(LoggerEffect):
         if amplitude == 0.0:
             return output
         return np.interp(inputs.time - delay, time, held)
+
+    def ahead_s(self, hours: float, amplitude: float, **shape: float) -> float:
+        return max(0.0, -amplitude, -amplitude * (1.0 + shape["growth"] * hours))
 
     def _growing(self, inputs: Inputs, growth: float) -> FloatArray:
         first = inputs.memory.first(f"{self.id} first", inputs.time)
