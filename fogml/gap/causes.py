@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +12,7 @@ from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import LinearGaussian
 from fogml.gap.posterior import Cause
-from fogml.gap.result import NAMED, Estimate, Found, RunAmplitude
-from fogml.gap.result_parts import Onset
+from fogml.gap.result import NAMED, Estimate, Found, Onset, RunAmplitude
 from fogml.gap.scene import Scene
 from fogml.gap.settings import Reported
 from fogml.signals.distributions import chi2_sf
@@ -25,7 +25,8 @@ def found_cause(
     scene, settings = found.scene, found.setting.priors.reported
     declared = scene.candidates[cause.ids[0]]
     _, high = declared.amplitude.range(scene.grade)
-    by_run, begun = _by_run(found, every, cause, card.lacking), onset(found, every, cause)
+    size = Estimate(card.lacking, card.amplitude_se, declared.amplitude.unit)
+    by_run, begun = _by_run(found, every, cause, card.lacking), onset(found, every, cause, size)
     acting = since(scene, by_run, begun)
     return Found(
         effect=cause.ids[0],
@@ -33,7 +34,7 @@ def found_cause(
         members=cause.ids,
         probability=probability,
         prior_probability=found.search.prior_probability(cause.ids),
-        amplitude=Estimate(card.lacking, card.amplitude_se, declared.amplitude.unit),
+        amplitude=size,
         parameters={
             q.name: Estimate(card.value.shape[q.name], card.shape_se.get(q.name, 0.0), q.unit)
             for q in declared.shape
@@ -102,11 +103,11 @@ def growth(scene: Scene, by_run: Sequence[RunAmplitude], least: float = Reported
     return slope if abs(slope) * spread**0.5 > least else None
 
 
-def onset(found: Inference, every: Foretold, cause: Cause) -> Onset | None:
+def onset(found: Inference, every: Foretold, cause: Cause, amplitude: Estimate) -> Onset | None:
     """Where a cause begins that these runs show from some time on, and not before; None where from the first.
 
     Its course, nought before, has to hold more than the whole course does by what exchanging a cause costs
-    and the choice among the times.
+    and the choice among the times. `amplitude` is its size over all runs.
     """
     held, settings = found.field, found.setting.priors.reported
     scene = found.setting.scene
@@ -128,4 +129,8 @@ def onset(found: Inference, every: Foretold, cause: Cause) -> Onset | None:
     if gain < found.setting.priors.exchange + np.log(len(places)):
         return None
     run, row = places[best]
-    return Onset(scene.runs[run].run.name, float(scene.runs[run].time_s[row]), gain)
+    scale = float(beside.fits(white[:, [best]])[0] / length[best])
+    se = float(np.hypot(length[best] ** -0.5, found.setting.priors.form_error * scale))
+    begun_s = float(scene.runs[run].time_s[row])
+    size = replace(amplitude, value=amplitude.value * scale, se=abs(amplitude.value) * se)
+    return Onset(scene.runs[run].run.name, begun_s, gain, size)

@@ -13,8 +13,8 @@ from fogml.gap.frame import whitener_of
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.posterior import Judgement
-from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Unknown, Verdict
-from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries, beyond_noise
+from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Onset, Unknown, Verdict
+from fogml.gap.result_parts import GapSegment, HowFar, Nearest, RunSeries, beyond_noise
 from fogml.gap.where import averages
 from fogml.numerals import percent, probability_words, short
 from fogml.runs.findings import IMPLAUSIBLE, SPOILING
@@ -231,7 +231,8 @@ def headline(
             f"{title}{others}: {probability_words(f.probability)} probable, {size}{usual}{share}{look}."
         )
         if f.onset is not None:
-            said.append(f"{title} {_since(found, f.onset)}, and not before.")
+            since = f"{short(f.onset.amplitude.value)} {f.amplitude.unit} since then"
+            said.append(f"{title} {_since(found, f.onset)}, and not before: {since}.")
         if f.grows is not None:
             way = "grows" if f.grows * f.amplitude.value > 0.0 else "fades"
             said.append(

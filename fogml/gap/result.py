@@ -16,7 +16,6 @@ from fogml.gap.result_parts import (
     Counterfactual,
     HowFar,
     Nearest,
-    Onset,
     Rehearsed,
     RunSeries,
     WhatIf,
@@ -47,6 +46,19 @@ class RunAmplitude:
     run: str
     value: float
     se: float
+
+
+@dataclass(frozen=True)
+class Onset:
+    """Since when an effect acts: the run, the time on its clock [s], and what that explains more [nats].
+
+    ``amplitude`` is its size since then: that of all runs is a mean.
+    """
+
+    run: str
+    time_s: float
+    gain: float
+    amplitude: Estimate
 
 
 @dataclass(frozen=True)

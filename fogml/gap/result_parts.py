@@ -150,15 +150,6 @@ class Nearest:
 
 
 @dataclass(frozen=True)
-class Onset:
-    """Since when an effect acts: the run, the time on its clock [s], and what that explains more [nats]."""
-
-    run: str
-    time_s: float
-    gain: float
-
-
-@dataclass(frozen=True)
 class Rehearsed:
     """What a diagnosis of these runs would say if one candidate acted alone.
 

@@ -18,6 +18,7 @@ from fogml.gap.model import TwinModel, with_effects
 from fogml.gap.planning import next_run as ahead
 from fogml.gap.posterior import _likeliest, judge
 from fogml.gap.reports import STAGES
+from fogml.gap.result import Estimate
 from fogml.gap.scene import Scene
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.unknown import unknown_families
@@ -150,15 +151,25 @@ def test_a_cause_acts_since_it_left_a_trace(found):
     best = found.explanations[0]
     every = Foretold.of(found, best.members)
     (cause,) = judge(found).causes
-    assert onset(found, every, cause) is None
+    assert onset(found, every, cause, Estimate(1.0, 0.0, "deg/h")) is None
     courses = [sum(every.of_member(i, m) for m in cause.members) for i in range(2)]
     half = len(courses[1]) // 2
     courses[1] = np.where(np.arange(len(courses[1])) < half, courses[1], 0.0)
     later = copy.copy(found.field)
     later.base = replace(later.base, data=later.base.data - later.whitening.stacked(courses))
-    begun = onset(SimpleNamespace(setting=found.setting, field=later), every, cause)
+    search = copy.copy(found.search)
+    search.field = later
+    again = replace(found, search=search)
+    mean = Foretold.of(again, best.members)
+    whole, less = (sum(f.of_member(1, m) for m in cause.members) for f in (every, mean))
+    size = 0.12 * float(whole @ less) / float(whole @ whole)
+    begun = onset(again, mean, cause, Estimate(size, 0.0, "deg/h"))
     assert begun.run == found.setting.scene.runs[1].run.name
     assert begun.time_s == pytest.approx(found.setting.scene.runs[1].time_s[half], abs=300.0)
+    # Its size over all runs is a mean of what it is since and of nothing.
+    assert size < 0.09
+    assert begun.amplitude.value == pytest.approx(0.12, abs=3.0 * begun.amplitude.se)
+    assert begun.amplitude.se < 0.02
 
 
 def test_a_name_among_several_that_are_alike_counts_for_all(found):
