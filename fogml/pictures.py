@@ -87,8 +87,8 @@ def line_figure(
         # Less than a decade might have no tick, and a flat curve would not look flat.
         room = max(0.0, 0.5 * (1.0 - (y_span[1] - y_span[0])))
         y_span = y_span[0] - room, y_span[1] + room
-    y_ticks = _ticks_of(y_span, "y" in log, about=4)
-    left = max(_LEFT, _TITLE + max((_width(_tick(value)) for value in y_ticks), default=0.0))
+    y_ticks = _labelled(_ticks_of(y_span, "y" in log, about=4))
+    left = max(_LEFT, _TITLE + max(map(_width, y_ticks.values()), default=0.0))
     top = _TOP + _LEGEND * (1 + (sum(bool(c.label) for c in curves) - 1) // _LEGEND_COLUMNS)
 
     def across(x: FloatArray | float) -> FloatArray:
@@ -100,18 +100,17 @@ def line_figure(
         )
 
     parts = [_legend([c for c in curves if c.label], width)]
-    for value in _ticks_of(x_span, "x" in log, about=8):
+    for value, label in _labelled(_ticks_of(x_span, "x" in log, about=8)).items():
         x = f"{float(across(value)):.1f}"
         parts.append(f'<path d="M{x},{top}V{height - _BOTTOM}" stroke="#E4E7EB"/>')
-        label = _tick(value)
         # A long label at the right edge would reach out of the picture.
         anchor = "end" if float(x) + 0.5 * _width(label) > width else "middle"
         at = f'x="{width if anchor == "end" else x}" y="{height - _BOTTOM + 13}" text-anchor="{anchor}"'
         parts.append(f"<text {at}>{label}</text>")
-    for value in y_ticks:
+    for value, label in y_ticks.items():
         y = float(up(value))
         parts.append(f'<path d="M{left:.1f},{y:.1f}H{width - _RIGHT}" stroke="#E4E7EB"/>')
-        parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{_tick(value)}</text>')
+        parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{label}</text>')
     for curve in curves:
         dash = f' stroke-dasharray="{curve.dash}"' if curve.dash else ""
         outline = _outline(across(curve.x), up(curve.y))
@@ -188,8 +187,10 @@ def _width(label: str) -> float:
     return sum(_WIDTHS.get(character, _DIGIT) for character in label)
 
 
-def _tick(value: float) -> str:
-    return f"{value + 0.0:g}".replace("-", "−")
+def _labelled(values: Sequence[float]) -> dict[float, str]:
+    """Ticks with their labels, of as many digits as tell them apart, six at least."""
+    digits = next((d for d in range(6, 12) if len({f"{v:.{d}g}" for v in values}) == len(values)), 12)
+    return {value: f"{value + 0.0:.{digits}g}".replace("-", "−") for value in values}
 
 
 _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])

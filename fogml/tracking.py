@@ -130,6 +130,9 @@ class Tracker:
             # Whatever a tracker runs into, the results stand in their files.
             self._away = True
             told = str(error).strip().partition("\n")[0]
+            user, at, _ = urlsplit(self._place).netloc.rpartition("@")
+            # MLflow's own messages quote the address whole.
+            told = told.replace(user + at, "") if at else told
             self._note(
                 f"--track {shown_tracker(self._place)}: does not answer ({told}); results are kept here"
             )

@@ -28,7 +28,7 @@ class Client:
     away_after: int | None = None
 
     def __init__(self, tracking_uri: str) -> None:
-        self.runs = self.held.setdefault(tracking_uri, {})
+        self.uri, self.runs = tracking_uri, self.held.setdefault(tracking_uri, {})
 
     def get_experiment_by_name(self, name: str) -> Any:
         return None if not self.runs else SimpleNamespace(experiment_id="1")
@@ -48,7 +48,8 @@ class Client:
 
     def create_run(self, experiment: str, run_name: str) -> Any:
         if self.away_after is not None and len(self.runs) >= self.away_after:
-            raise ConnectionError("no route to host\nmore")
+            # As mlflow.utils.rest_utils.http_request says it.
+            raise ConnectionError(f"API request to {self.uri}/api failed: no route to host\nmore")
         name = str(len(self.runs))
         self.runs[name] = {"name": run_name, "params": {}, "metrics": {}, "tags": {}, "ended": False}
         return SimpleNamespace(info=SimpleNamespace(run_id=name))

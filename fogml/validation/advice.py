@@ -23,7 +23,7 @@ from fogml.validation.reasons import (
 from fogml.validation.results import Judgement, RunJudgement
 
 SEEN = "seen_in_training"
-"""Code of the finding that a test run holds the samples of a training run."""
+"""Code of the finding that a test run holds samples of a training run."""
 
 
 @dataclass(frozen=True)
@@ -127,14 +127,6 @@ def which_to_use(judgement: Judgement, asked: Asked | None = None) -> tuple[str 
     return None, f"Use either: {told}, which is no difference that another run would be sure to repeat."
 
 
-def coverage(run: RunJudgement) -> float | None:
-    """Share of a run's averages that lie within the model's 90 % interval; None where it states none."""
-    series = run.series
-    if not np.any(series.upper > 0.0):
-        return None
-    return float(np.mean((series.after >= series.lower) & (series.after <= series.upper)))
-
-
 def output_reasons(judgement: Judgement, asked: Asked | None = None) -> Iterator[Reason]:
     """What speaks against any model of these runs: an output that is still or saturates, what can't be."""
     asked = asked or Asked()
@@ -170,8 +162,8 @@ def _not_judged(judgement: Judgement) -> Iterator[Reason]:
         yield Reason(
             "do_not_use" if len(seen) == len(judgement.test) else "use_with_care",
             "not judged on another run",
-            f"{', '.join(seen)} is a training run: its figures say how well the model fits, not how well it "
-            "holds.",
+            f"{', '.join(seen)} holds samples of a training run: its figures say how well the model fits, "
+            "not how well it holds.",
             "Record another run, and name it after --test.",
         )
 
@@ -206,7 +198,7 @@ def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
             "not hold: there the model falls back.",
             "Train over the whole range of use.",
         )
-    held = coverage(run)
+    held = run.coverage
     if held is not None and held < asked.coverage:
         yield Reason(
             "use_with_care",

@@ -218,6 +218,20 @@ class RunMetrics:
         """Averages over the averaging time of columns that hold the used rows only."""
         return block_averages(self._time, *columns, window_s=window_s or self.averaging_s)
 
+    def coverage(self, error_deg_h: FloatArray, half_width: FloatArray, over_s: float) -> float | None:
+        """Share of averages that lie within an interval about zero; None where it has no width.
+
+        Parameters
+        ----------
+        error_deg_h, half_width
+            Error series and half-width of the interval [deg/h] of the whole run, shape (n,).
+        over_s
+            Time that the interval is of averages over [s], whatever that of the figures is.
+        """
+        columns = (error_deg_h[self.used], half_width[self.used])
+        error, half = self.averages(*columns, window_s=over_s).values
+        return float(np.mean(np.abs(error) <= half)) if np.any(half > 0.0) else None
+
     def soak_biases(self, before_deg_h: FloatArray, after_deg_h: FloatArray) -> tuple[SoakBias, ...]:
         """Mean errors over each soak of error series of the whole run [deg/h], shape (n,)."""
         return tuple(

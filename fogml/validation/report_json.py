@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from fogml.json_files import finite_json
-from fogml.validation.advice import advice_on, coverage
+from fogml.validation.advice import advice_on
 from fogml.validation.certified import set_up, with_uncertainty
 from fogml.validation.floors import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, Metrics, Repeatability, RunJudgement
@@ -77,7 +77,7 @@ def _run(judged: RunJudgement) -> dict[str, Any]:
         "left_is_noise": left_is_noise(judged),
         "outside_training": judged.outside_training,
         "not_settled": judged.not_settled,
-        "coverage": coverage(judged),
+        "coverage": judged.coverage,
         "rows_used": judged.rows_used,
         "rows_left_out": judged.rows_left_out,
         "bias_reference": judged.bias_reference,

@@ -120,7 +120,8 @@ class RunJudgement:
     ``scale_factor_se`` and ``scale_factor_half_width`` the standard error of the scale factor error after
     compensation and the half-width of its 90 % interval [ppm], by what the turns scatter about it,
     ``soaks`` the bias at each soak, ``not_settled`` the share of the rows used at which a window was not
-    wholly full or a memory still went by what was before the run.
+    wholly full or a memory still went by what was before the run, ``coverage`` the share of averages within
+    the model's 90 % interval, over the time that this is of; None where it states none.
     """
 
     run: str
@@ -149,6 +150,7 @@ class RunJudgement:
     scale_factor_half_width: float | None = None
     soaks: tuple[SoakBias, ...] = ()
     not_settled: float = 0.0
+    coverage: float | None = None
 
     @property
     def still(self) -> tuple[str, float] | None:

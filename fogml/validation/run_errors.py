@@ -15,6 +15,7 @@ from fogml.errors import InputError
 from fogml.intervals import LEVEL
 from fogml.models.table import usable_rows
 from fogml.runs.run import Run
+from fogml.signals.averages import AVERAGING_S
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -45,6 +46,8 @@ class RunErrors:
         at rest where the run both stands and turns; as models are fitted to.
     notes
         What was left out, and on the model's use on this run.
+    interval_averaging_s
+        Time that the prediction interval is of averages over [s].
     """
 
     run: Run
@@ -56,6 +59,7 @@ class RunErrors:
     full: BoolArray
     used: BoolArray
     notes: tuple[str, ...]
+    interval_averaging_s: float = AVERAGING_S
 
     @property
     def after(self) -> FloatArray:
@@ -88,6 +92,7 @@ def run_errors(model: DriftModel, run: Run, *, any_unit: bool = False) -> RunErr
         full=evaluation.full,
         used=used,
         notes=(*notes, *left_out),
+        interval_averaging_s=model.intervals_.averaging_s,
     )
 
 

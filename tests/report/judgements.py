@@ -79,6 +79,7 @@ def judged_run(
         rows_left_out=128,
         bias_reference="training mean",
         series=series,
+        coverage=float(np.mean(np.abs(series.after) <= series.upper)),
         findings=findings,
         notes=notes,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -180,6 +181,19 @@ def test_the_small_figure_draws_gaps_as_gaps() -> None:
 def test_the_small_figure_of_a_constant_is_drawn() -> None:
     svg = line_figure([Curve(np.arange(3.0), np.full(3, 2.0), "#000000")], "x", "y", "constant")
     assert "nan" not in svg
+
+
+def test_labels_of_a_small_span_far_from_zero_are_told_apart() -> None:
+    """A rate of 123456.6 to 123457.2 deg/h: labels differ, and each is the value at its height."""
+    y = np.array([123456.6, 123457.2])
+    svg = line_figure([Curve(np.arange(2.0), y, "#000000")], "x", "y", "far")
+    told = re.findall(r'y="([0-9.]+)" text-anchor="end">([0-9.]+)<', svg)
+    heights, values = np.array(told, dtype=np.float64).T
+    assert len(told) > 2 and len(set(values)) == len(values)
+    assert (
+        np.ptp(np.diff(values) / np.diff(heights))
+        < 1e-3 * abs(np.diff(values) / np.diff(heights)).max() + 1e-3
+    )
 
 
 def test_the_small_figure_has_a_legend_dots_and_logarithmic_axes() -> None:

@@ -12,7 +12,7 @@ from fogml.models.names import make_model
 from fogml.report.verdict import advice_words
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
-from fogml.validation.advice import Asked, advice_on, coverage, which_to_use
+from fogml.validation.advice import Asked, advice_on, which_to_use
 from fogml.validation.judge import judge
 from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement, RunJudgement
@@ -69,10 +69,7 @@ def used_there(judged: Judgement) -> Judgement:
 def overconfident() -> Judgement:
     base = judgement()
     (run,) = base.test
-    series = run.series
-    return replace(
-        base, test=(replace(run, series=replace(series, lower=series.lower / 10, upper=series.upper / 10)),)
-    )
+    return replace(base, test=(replace(run, coverage=0.5),))
 
 
 def test_nothing_against_is_use() -> None:
@@ -164,8 +161,7 @@ def test_what_is_taken_away_is_told_by_squares(drift: float, left: float, grade:
     (run,) = judged.test
     before, after = (FLOOR * float(np.hypot(1.0, part * drift)) for part in (1.0, left))
     figures = [replace(run.before, bias=0.0, bias_stability=rms, rms=rms) for rms in (before, after)]
-    series = replace(run.series, lower=np.zeros_like(run.series.time), upper=np.zeros_like(run.series.time))
-    run = replace(run, before=figures[0], after=figures[1], series=series)
+    run = replace(run, before=figures[0], after=figures[1], coverage=None)
     found = advice_on(replace(judged, test=(run,)))
     assert (found.grade, found.brief) == (grade, brief)
 
@@ -211,21 +207,13 @@ def test_what_is_asked_may_be_changed() -> None:
     assert advice_on(judged, Asked(outside=0.2)).grade == "use"
 
 
-def test_coverage_counts_averages_within_the_interval() -> None:
-    (run,) = judgement().test
-    inside = np.abs(run.series.after) <= run.series.upper
-    assert coverage(run) == pytest.approx(inside.mean())
-    none = replace(run.series, lower=0.0 * run.series.lower, upper=0.0 * run.series.upper)
-    assert coverage(replace(run, series=none)) is None
-
-
 def test_report_and_words_say_the_same() -> None:
     judged = one_way("up", "down")
     values = judgement_json(judged)
     told = advice_words(advice_on(judged))
     assert values["verdict"] == "do_not_use" and list(told["reasons"]) == values["reasons"]
     assert told["words"] == "Do not use: trained one way" and told["sign"] == "✗"
-    assert values["test"][0]["coverage"] == coverage(judged.test[0])
+    assert values["test"][0]["coverage"] == judged.test[0].coverage
 
 
 @pytest.mark.parametrize(("times", "told"), [(3600.0, True), (1.0 / 3600.0, True), (20.0, False)])

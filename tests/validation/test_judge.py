@@ -92,7 +92,7 @@ def test_turns_tell_the_scale_factor_and_not_the_bias():
 
 
 def test_share_outside_training_is_of_the_rows_that_count():
-    train, test = ramp_run("a.csv", 0.0), ramp_run("b.csv", 0.0, low=10.0)
+    train, test = ramp_run("a.csv", 0.0), ramp_run("b.csv", 0.1, low=10.0)
     model = KnownDrift(slope_law, hottest=40.0).fit(train)
     (run,) = judge(model, train, test).test
     assert run.outside_training == pytest.approx(0.25, abs=0.001)
@@ -194,3 +194,47 @@ def test_what_is_outside_counts_while_a_memory_settles(memory):
     (run,) = judge(make_model("polynomial", f"T, {memory}").fit(train), train, test).test
     assert run.not_settled > 0.1
     assert run.outside_training == 1.0
+
+
+def test_coverage_is_of_averages_over_the_interval_s_own_time_whatever_that_of_the_figures_is():
+    """A line and white noise: about nine of ten averages over 100 s, by hand, with figures of 10 to 500 s."""
+    rng = np.random.default_rng(3)
+    runs = [ramp_run(name, 0.3, n=12000) for name in ("a.csv", "b.csv")]
+    runs = [run.with_columns(gyro=run.gyro + rng.standard_normal(len(run))) for run in runs]
+    model = make_model("polynomial", "T").fit(runs[0])
+    half, over_s = float(model.intervals_.half_width(0.9)), model.intervals_.averaging_s
+    left = runs[1].error_deg_h - model.predict(runs[1])
+    inside = np.abs(left.reshape(-1, round(over_s)).mean(axis=1)) <= half
+    for averaging_s in (10.0, 100.0, 500.0):
+        (run,) = judge(model, runs[0], runs[1], averaging_s=averaging_s).test
+        assert run.coverage == pytest.approx(inside.mean(), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "coarse", "share"),
+    [
+        (0, 4000, 0.0, 1.0),
+        (1000, 3000, 0.0, 1.0),
+        (2000, 6000, 0.0, 0.5),
+        (2000, 6000, 0.5, 0.5),
+        (4000, 8000, 0.5, 0.0),
+    ],
+)
+def test_samples_of_a_training_run_are_told_though_cut_and_on_another_clock(start, stop, coarse, share):
+    """Of 8000 samples the first half is trained on; the test run is another part, its clock begun anew."""
+    rng = np.random.default_rng(5)
+    whole = ramp_run("whole.csv", 0.3, n=8000)
+    gyro = whole.gyro + rng.standard_normal(len(whole))
+    whole = whole.with_columns(gyro=np.round(gyro / coarse) * coarse if coarse else gyro)
+    train, part = whole[:4000], whole[start:stop]
+    test = Run("test.csv", {**part.columns, "time": part.time - part.time[0]})
+    (run,) = judge(KnownDrift(slope_law).fit(train), train, test).test
+    told = [finding for finding in run.findings if finding.code == "seen_in_training"]
+    assert bool(told) == bool(share)
+    assert sum(finding.count for finding in told) == pytest.approx(share * len(test), abs=len(test) / 16)
+
+
+def test_outputs_that_stand_still_alike_are_not_taken_for_the_same_samples():
+    train, test = (Run(name, {**ramp_run(name, 0.3).columns, "gyro": np.full(4000, 0.3)}) for name in "ab")
+    (run,) = judge(KnownDrift(slope_law).fit(train), train, test).test
+    assert not any(finding.code == "seen_in_training" for finding in run.findings)
