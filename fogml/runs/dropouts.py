@@ -9,11 +9,12 @@ from enum import Enum
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
-from fogml.intervals import MEDIAN_SIZE
 from fogml.signals import large
 
 _STARTING = 9
 _LEAST_GOOD = 0.5
+_STEP_PER_OFF = 3.075
+# Of white noise s: sqrt(2) s over the median 0.3755 of the lesser of two normal sizes, times sqrt(1.5) s.
 
 
 @dataclass(frozen=True)
@@ -182,14 +183,20 @@ def _jumps(time: FloatArray, values: FloatArray, rule: DropoutRule, jump_degC: f
 
 
 def _noise(values: FloatArray) -> float:
-    """Robust standard deviation of the steps that are any [degC]."""
+    """Robust standard deviation of a step, by readings that changed and those two before and after [degC].
 
-    def steps() -> Iterator[FloatArray]:
-        for _, step in large.differences(values):
-            yield np.abs(step[step != 0.0])
+    How far one is off their middle, the lesser of two neighbours: beside a false reading one is off nothing,
+    so that no spikes make a quiet thermometer a noisy one, however seldom it changes; nor does a ramp.
+    """
 
-    middle = large.median(steps)
-    return 0.0 if np.isnan(middle) else middle / MEDIAN_SIZE
+    def off() -> Iterator[FloatArray]:
+        for part in large.pieces(values):
+            changed = values[part][np.diff(values[part], prepend=np.nan) != 0.0]
+            away = np.abs(changed[2:-2] - 0.5 * (changed[:-4] + changed[4:]))
+            yield np.minimum(away[:-1], away[1:])
+
+    middle = large.median(off)
+    return 0.0 if np.isnan(middle) else _STEP_PER_OFF * middle
 
 
 def _first_good(time: FloatArray, values: FloatArray, ranged: BoolArray, rule: DropoutRule) -> int:

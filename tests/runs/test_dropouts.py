@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fogml.features.parse import parse_features
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
 from fogml.runs.dropouts import RULE, DropoutRule, last_reading, read_thermometer
@@ -137,3 +138,41 @@ def test_other_facts_and_findings_leave_the_rule_as_it_is():
     assert run.temperature()[50] == 20.0
     assert run.with_facts(Facts(unit="F")).temperature()[50] == 20.0
     assert run.with_findings([]).temperature()[50] == 20.0
+
+
+@pytest.mark.parametrize("spikes", [1, 40])
+@pytest.mark.parametrize("moves", [0.0, 0.0625])
+def test_spikes_make_no_quiet_thermometer_a_noisy_one(spikes, moves):
+    """A thermometer that stands still or steps once, and spells of its sentinel: they alone change often."""
+    time = np.arange(4000.0)
+    values = np.where(time < 2000.0, 25.0, 25.0 + moves)
+    false = np.isin(np.arange(4000), 50 + 90 * np.arange(spikes)[:, None] + np.arange(3))
+    values[false] = 85.0
+    found = read_thermometer(time, values)
+    assert np.array_equal(np.flatnonzero(found.bad), np.flatnonzero(false))
+
+
+def test_a_noisy_thermometer_steps_by_its_noise_and_no_further():
+    """White noise of 3 degC, held or not: none of it is a dropout, 120 degC more is (8 sqrt(2) 3 = 34)."""
+    rng = np.random.default_rng(0)
+    for held in (1, 20):
+        values = np.repeat(25.0 + 3.0 * rng.standard_normal(4000 // held), held)
+        values[2000] += 120.0
+        found = read_thermometer(np.arange(4000.0), values)
+        assert np.flatnonzero(found.bad).tolist() == [2000]
+
+
+@pytest.mark.parametrize("length", [1, 7, 64])
+def test_blocks_of_any_length_find_the_dropouts_of_the_whole(length):
+    rng = np.random.default_rng(1)
+    time = np.arange(640.0)
+    values = 20.0 + 15.0 * np.sin(time / 60.0) + 0.05 * rng.standard_normal(len(time))
+    for start in (100, 200, 203, 441):
+        values[start : start + 5] = rng.choice([-127.0, 85.0, 0.0])
+    run = Run("run", {"time": time, "gyro": np.zeros(len(time)), "T": values})
+    features = parse_features("T, dT[slope, 20 s], lag(T, 30 s)")
+    blocks = features.blocks(1.0)
+    pieces = [blocks.push(run[at : at + length]) for at in range(0, len(run), length)]
+    whole = features.atom_values(run)
+    assert np.array_equal(np.concatenate([piece.full for piece in pieces]), whole.full)
+    np.testing.assert_allclose(np.concatenate([piece.values for piece in pieces]), whole.values, atol=1e-9)
