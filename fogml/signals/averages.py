@@ -184,6 +184,20 @@ def mean_cosine(before: FloatArray, after: FloatArray) -> FloatArray:
     return np.cos(before + half) * _sine_ratio(half)
 
 
+def covered_share(time: FloatArray, step_s: FloatArray, gap: float = 1.5) -> FloatArray:
+    """Share of the time since the sample before that each sample covers, shape (n,).
+
+    Parameters
+    ----------
+    time, step_s
+        Time, and time since the sample before [s], shape (n,).
+    gap
+        Of the usual step: a longer one is a gap, and the sample after it as long as usual.
+    """
+    usual = Clock(time).sample_s
+    return np.divide(usual, step_s, out=np.ones(len(time)), where=step_s > gap * max(usual, 1e-300))
+
+
 def with_whole_turns(turned_deg: FloatArray, told_deg: FloatArray) -> FloatArray:
     """Differences of an angle [deg] with the whole turns that its record may have left out, shape (n,).
 

@@ -12,7 +12,7 @@ import numpy as np
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
-from fogml.signals.averages import mean_cosine, with_whole_turns
+from fogml.signals.averages import covered_share, mean_cosine, with_whole_turns
 from fogml.twin.attitude import Attitude, attitude, earth_rate, turned
 from fogml.twin.memory import Memory
 from fogml.twin.optics import REFERENCE_COIL, Coil, Light
@@ -253,18 +253,19 @@ class Inputs:
         return attitude(self.facts)
 
     def table_cosine(self, phase_deg: float, harmonic: float = 1.0) -> FloatArray:
-        """cos(harmonic * table angle + phase), as the mean since the sample before; shape (n,)."""
-        moves = self.turned_deg.any()
+        """cos(harmonic * table angle + phase), as the mean over each sample; shape (n,)."""
+        turned = self.turned_deg * covered_share(self.time, self._step_s)
+        moves = turned.any()
         after = np.radians(harmonic * (self.angle_deg if moves else self.angle_deg[:1]) + phase_deg)
         if not moves:
             return np.repeat(np.cos(after), len(self))
-        return mean_cosine(after - np.radians(harmonic * self.turned_deg), after)
+        return mean_cosine(after - np.radians(harmonic * turned), after)
 
     def carried(self, fixed: FloatArray, vector: FloatArray, *, mean: bool = True) -> FloatArray | float:
         """A fixed vector along one that turns with the table; shape (n,).
 
         Both of shape (3,), to north, west and up, the second at table angle 0; one number where the table
-        does not change it. As the mean since the sample before, or at the samples.
+        does not change it. As the mean over each sample, or at the samples.
         """
         held = self.attitude
         constant, cosine, sine = turned(fixed, vector, held.table)

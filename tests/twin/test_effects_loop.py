@@ -118,6 +118,10 @@ def test_fringe_jump_begins_within_a_sample_and_ends_with_a_power_cycle() -> Non
     assert found[time == 1000.0] == pytest.approx(0.3)
     assert np.all(found[(time > 1000.0) & (time < 2000.0)] == 1.0)
     assert not found[(time >= 2000.0) & (time < 2990.0)].any()
+    # A sample after a gap in which it happened is whole.
+    left = (time < 900.0) | (time > 1200.0)
+    gappy = replace(given, time=time[left], table_rate=given.table_rate[left])
+    assert np.array_equal(loop("fringe_jump").signature(gappy, onset=997.0) / FRINGE, found[left])
     # Without a power-on the first sample counts, also from block to block.
     memory = Memory()
     late = inputs(time + 5000.0)

@@ -123,6 +123,18 @@ def test_cosine_of_a_table_is_its_mean_however_fast_it_turns(rate: float, record
     assert found[1:] == pytest.approx(np.diff(np.sin(edges)) / np.radians(rate * step), abs=1e-9)
 
 
+@pytest.mark.parametrize("rate", [4.0, -20.0])
+def test_cosine_of_a_table_is_that_of_the_samples_that_are_left(rate: float) -> None:
+    """A sample after lost ones is a mean over its own time, and so is one after a gap."""
+    angle = rate * TIME
+    kept = np.random.default_rng(2).random(N) > 0.3
+    kept[300:330] = False
+    turning = inputs(table_rate=np.full(N, rate), drives={"angle": angle})
+    left = inputs(time=TIME[kept], table_rate=np.full(kept.sum(), rate), drives={"angle": angle[kept]})
+    wanted = turning.table_cosine(20.0)[kept]
+    assert left.table_cosine(20.0)[1:] == pytest.approx(wanted[1:], abs=1e-9)
+
+
 @settings(max_examples=30, deadline=None)
 @drawn(st.floats(-1e3, 1e3), st.floats(-50.0, 50.0))
 def test_mean_of_a_cosine_is_its_integral(start: float, width: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.signals.averages import covered_share
 from fogml.twin.effect import LoopEffect, ReadoutEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import shared, signed, unsigned
@@ -146,6 +147,7 @@ class FringeJump(LoopEffect):
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         time = inputs.time
         step = time - inputs.memory.previous(f"{self.id} time", time)
+        step = step * covered_share(time, step)
         beginning = inputs.memory.first(f"{self.id} first time", time)
         since = np.where(np.isinf(inputs.time_on_s), time - beginning, inputs.time_on_s)
         late = since - shape["onset"]
