@@ -189,10 +189,12 @@ def _figures(run: RunJudgement) -> Table:
         "the table does not turn" if error is None else "all turns, by their scatter",
     )
     for name, term in (run.noise or {}).get("terms", {}).items():
-        if name in _TERMS and term and term.get("value") is not None:
-            ends = term.get("ci") or (None,)
-            told = "" if None in ends else " to ".join(number(end) for end in ends)
-            add(_TERMS[name], f"{number(term['value'])} {term['unit']}", told, "Allan deviation of the run")
+        low, high = term.get("ci") or (None, None)
+        if name in _TERMS and low is not None and high > 0.0:
+            # What is not told from nothing has no figure.
+            value = number(term["value"]) if low > 0.0 else f"at most {number(high)}"
+            told = f"{number(low)} to {number(high)}"
+            add(_TERMS[name], f"{value} {term['unit']}", told, "Noise terms of the run")
     return Table("Figure | >Value | >90 % interval | Of", rows)
 
 

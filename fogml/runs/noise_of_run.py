@@ -105,7 +105,8 @@ def noise_report(
     if any(len(set(large.extremes(one.gyro))) == 1 for one in runs):
         unread = dict.fromkeys("QNBKR", "not read from an output that stands still")
     spectrum = spectrum_of_runs(series, [bool(one) for one in moves])
-    terms = noise_terms(spectrum, whole, LEVEL, least_tau_s=first.new_s, ramps=len(series))
+    least, drifts = first.new_s, any(map(bool, moves))
+    terms = noise_terms(spectrum, whole, LEVEL, least_tau_s=least, ramps=len(series), drifts=drifts)
     alone = [_alone(one, bool(m)) for one, m in zip(series, moves)] if len(series) > 1 else []
     steady = stationarity(first.stretches, first.new_s) if len(series) == 1 else None
     warnings = [
@@ -152,7 +153,8 @@ def _alone(series: NoiseSeries, moves: bool) -> NoiseTerms:
     values, segments = joined([series])
     times = _default_times(series.sample_s, max(part.stop - part.start for part in segments))
     allan = allan_deviation(values, series.sample_s, times, segments=segments, level=LEVEL)
-    return noise_terms(spectrum_of_runs([series], [moves]), allan, LEVEL, least_tau_s=series.new_s, ramps=1)
+    spectrum = spectrum_of_runs([series], [moves])
+    return noise_terms(spectrum, allan, LEVEL, least_tau_s=series.new_s, ramps=1, drifts=moves)
 
 
 def _default_times(sample_s: float, samples: int) -> FloatArray:

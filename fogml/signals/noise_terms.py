@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -122,6 +122,7 @@ def noise_terms(
     *,
     least_tau_s: float = 0.0,
     ramps: int | None = None,
+    drifts: bool = False,
 ) -> NoiseTerms:
     """Noise terms from the spectrum of a rate in deg/h.
 
@@ -134,7 +135,8 @@ def noise_terms(
 
     B is the minimum of the Allan deviation over 0.664, the value that data sheets give, and its interval
     covers both that and the flicker of the model. A term whose interval reaches 0 is not supported by
-    the data; B has no value then if the curve has no minimum within its times.
+    the data; B has no value then if the curve has no minimum within its times. Where the values drift, the
+    minimum is the drift's, and B the flicker of the model.
 
     Parameters
     ----------
@@ -149,6 +151,8 @@ def noise_terms(
         Averaging time below which the Allan deviation says nothing, as values are repeated [s].
     ramps
         Number of columns that are straight lines; all if None.
+    drifts
+        Whether the deviation holds drift that the spectrum keeps out.
 
     Raises
     ------
@@ -175,7 +179,10 @@ def noise_terms(
     trusted = seen & (allan.edf >= _TRUSTED) if np.any(seen & (allan.edf >= _TRUSTED)) else seen
     lowest = np.flatnonzero(trusted)[np.argmin(allan.adev[trusted])]
     falling = lowest == np.flatnonzero(trusted)[-1]
-    terms["B"] = _bias_instability(terms["B"], allan, int(lowest), still_falling=bool(falling))
+    if not drifts:
+        terms["B"] = _bias_instability(terms["B"], allan, int(lowest), still_falling=bool(falling))
+    elif not terms["B"].lower > 0.0:
+        terms["B"] = replace(terms["B"], value=None)
     return NoiseTerms(
         terms,
         float(allan.adev[lowest]),

@@ -89,6 +89,19 @@ def test_moving_temperature_takes_k_and_r_away(column: str):
     assert report["terms"]["N"]["value"] is not None
 
 
+def test_the_minimum_of_a_drift_is_no_bias_instability():
+    """White noise alone on a drift with T: the deviation has a minimum, over 0.664 far above the bound of B."""
+    rng, time = np.random.default_rng(3), np.arange(28_000.0)
+    temperature = 25.0 + 40.0 * np.sin(2.0 * np.pi * time / 28_000.0)
+    for seed in range(3):
+        gyro = 0.02 * temperature + 0.3 * np.random.default_rng(seed).standard_normal(len(time))
+        read = temperature + 0.01 * rng.standard_normal(len(time))
+        report = noise_report(Run.from_columns("drift", time=time, gyro=gyro, T=read))
+        flicker, from_minimum = report["terms"]["B"], report["minimum"]["adev"] / 0.664
+        assert flicker["value"] is None and flicker["ci"][0] == 0.0
+        assert from_minimum > 2.0 * flicker["ci"][1]
+
+
 def test_steady_temperature_leaves_them():
     rng = np.random.default_rng(2)
     steady = 20.0 + np.round(rng.normal(size=20_000)) / 2
