@@ -90,7 +90,7 @@ def test_moving_temperature_takes_k_and_r_away(column: str):
 
 
 def test_the_minimum_of_a_drift_is_no_bias_instability():
-    """White noise alone on a drift with T: the deviation has a minimum, over 0.664 far above the bound of B."""
+    """White noise alone on a drift with T: the minimum over 0.664 is far above the bound of B."""
     rng, time = np.random.default_rng(3), np.arange(28_000.0)
     temperature = 25.0 + 40.0 * np.sin(2.0 * np.pi * time / 28_000.0)
     for seed in range(3):
