@@ -138,23 +138,18 @@ def _figure(values: Mapping[str, Any]) -> Markup | None:
     """Bias over soak temperature, up and down, before and after."""
     lines = values["soaks"]
     whens = [("before", style.BEFORE)] + ([("after", style.AFTER)] if values["model"] is not None else [])
-    curves = []
+    curves: list[Curve] = []
     for when, colour in whens:
         for way, dash in (("up", ""), ("down", "4 2.5")):
-            held = [(one["temperature_degC"], one[when][way]) for one in lines if one[when][way] is not None]
-            if len(held) > 1:
-                x, y = np.array(sorted(held)).T
-                curves.append(
-                    Curve(
-                        x,
-                        y,
-                        colour,
-                        dash,
-                        label=f"{when}, way {way}" if len(whens) > 1 else f"way {way}",
-                        dots=True,
-                    )
-                )
-    if not curves:
+            label = f"{when}, way {way}" if len(whens) > 1 else f"way {way}"
+            # A line joins soaks of one run: from one to the next the bias moves by more than temperature.
+            for run in _names(lines):
+                soaks = [one for one in lines if one["run"] == run and one[when][way] is not None]
+                if soaks:
+                    x, y = np.array(sorted((one["temperature_degC"], one[when][way]) for one in soaks)).T
+                    curves.append(Curve(x, y, colour, dash, label=label, dots=True))
+                    label = ""
+    if not any(len(curve.x) > 1 for curve in curves):
         return None
     return line_figure(curves, "T [°C]", "bias [deg/h]", "Bias at each soak temperature, up and down")
 

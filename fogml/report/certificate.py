@@ -189,11 +189,11 @@ def _figures(run: RunJudgement) -> Table:
         "the table does not turn" if error is None else "all turns, by their scatter",
     )
     for name, term in (run.noise or {}).get("terms", {}).items():
-        low, high = term.get("ci") or (None, None)
-        if name in _TERMS and low is not None and high > 0.0:
+        least, most = term.get("ci") or (None, None)
+        if name in _TERMS and least is not None and most is not None and most > 0.0:
             # What is not told from nothing has no figure.
-            value = number(term["value"]) if low > 0.0 else f"at most {number(high)}"
-            told = f"{number(low)} to {number(high)}"
+            value = number(term["value"]) if least > 0.0 else f"at most {number(most)}"
+            told = f"{number(least)} to {number(most)}"
             add(_TERMS[name], f"{value} {term['unit']}", told, "Noise terms of the run")
     return Table("Figure | >Value | >90 % interval | Of", rows)
 

@@ -16,6 +16,8 @@ from fogml.errors import InputError
 from fogml.lab.acceptance import acceptance_json
 from fogml.lab.acceptance_rows import QUANTITIES, read_limits
 from fogml.models.names import make_model
+from fogml.pictures import Curve
+from fogml.report import acceptance_page as page
 from fogml.report.acceptance_page import acceptance_page, limit_words, named
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
@@ -182,3 +184,18 @@ def test_what_is_written_and_the_example_are_of_the_documented_schema(report, cy
     for values in (example, report, acceptance_json([cycle], limits=limits(threshold=1.0))):
         assert not [error.message for error in check.iter_errors(values)]
     assert [error.message for error in check.iter_errors({**example, "verdict": "good"})]
+
+
+def test_soaks_of_two_runs_are_no_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two runs over the same temperatures each is a line of its own, over every temperature once."""
+    drawn: list[Curve] = []
+    monkeypatch.setattr(page, "line_figure", lambda curves, *_: drawn.extend(curves))
+    ways = {"down": None, "start": None, "hysteresis": None}
+    soaks = [
+        {"run": run, "temperature_degC": at, "before": {"up": bias + at, **ways}}
+        for run, bias in (("a.csv", 0.0), ("b.csv", 5.0))
+        for at in (-40.0, 60.0)
+    ]
+    page._figure({"soaks": soaks, "model": None})
+    assert [curve.y.tolist() for curve in drawn] == [[-40.0, 60.0], [-35.0, 65.0]]
+    assert [curve.label for curve in drawn] == ["way up", ""]
