@@ -26,6 +26,8 @@ from fogml.twin.twin import EffectSetting, Twin
 _ROWS = 600
 """Samples of a storage, the closer the sooner after the run before: every state fades by its own time."""
 _FIRST_S = 10.0
+START_SLACK = 1e-3
+"""Of a sample, that a run may begin before the one before has ended: what times are rounded by."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,7 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
         time = clock + given.time
         own = tuple((on + clock, off + clock) for on, off in replayer.windows)
         if number:
-            if time[0] < ended:
+            if time[0] < ended - START_SLACK * _step(one):
                 raise InputError(f"{one.name}: it starts before {runs[number - 1].name} has ended")
             windows = windows_with_history(windows, own, clock, ended, storage)
             assert left is not None

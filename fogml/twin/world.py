@@ -30,6 +30,7 @@ from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.programme import Programme
 from fogml.twin.recorder import Samples, Worked, recorded_output
 from fogml.twin.replay_after import (
+    START_SLACK,
     Storage,
     later_s,
     storage_drives,
@@ -100,7 +101,7 @@ class World:
         storage = Storage() if storage is None else storage
         if before is not None:
             self.clock_s = later_s(facts, before._first_facts, programme.name)
-            if self.clock_s < before.end_s:
+            if self.clock_s < before.end_s - START_SLACK * sample_s:
                 raise InputError(f"{programme.name}: it starts before the unit's run before it has ended")
             shifted = tuple((on + self.clock_s, off + self.clock_s) for on, off in self._windows)
             self._windows = windows_with_history(

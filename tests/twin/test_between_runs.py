@@ -233,3 +233,17 @@ def test_storage_goes_on_from_the_last_sample_of_the_run_before() -> None:
     assert second.truth is not None
     told = replay_after(twin, second.run, [first.run])
     np.testing.assert_allclose(told, second.truth.noise_free, atol=0.05)
+
+
+@pytest.mark.parametrize(("sample_s", "count"), [(1.0 / 3.0, 100), (0.1, 777), (0.01, 777)])
+def test_a_run_may_follow_at_once_though_times_are_rounded(sample_s: float, count: int) -> None:
+    """Datetimes hold microseconds: of these runs the next begins up to 0.3 us before the one before ends."""
+    steps = [f"soak at 25 degC for {sample_s * count!r} s"]
+    first = simulate(steps, unit(), sample_s=sample_s, facts=facts())
+    at = facts(sample_s * count / 3600.0)
+    second = simulate(steps, unit(), sample_s=sample_s, facts=at, after=first)
+    assert len(second.run) == count
+    assert replay_after(unit(), second.run, [first.run]) == pytest.approx(second.run.gyro, abs=1e-9)
+    early = facts(sample_s * (count - 0.01) / 3600.0)
+    with pytest.raises(InputError, match="ended"):
+        simulate(steps, unit(), sample_s=sample_s, facts=early, after=first)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,20 @@ def test_blocks_do_not_matter(monkeypatch, skew):
         np.testing.assert_allclose(pieces.run.columns[name], values, rtol=1e-11, atol=1e-9, err_msg=name)
     for cell, values in whole.truth.columns().items():
         np.testing.assert_allclose(pieces.truth.columns()[cell], values, rtol=1e-10, atol=1e-8, err_msg=cell)
+
+
+@pytest.mark.parametrize("id", ["logger_skew", "averaging", "output_counts", "units_and_gaps"])
+def test_a_unit_may_be_off_for_longer_than_a_block_before_it_is_first_on(monkeypatch, id):
+    """Nothing is logged of such a block."""
+    twin = replace(load_twin("tactical"), settings={}, noise=NoiseConstants()).with_effect(id)
+    steps = ["soak at 25 degC for 20 min", {"ramp to 40 degC at 1 degC/min": ["power on at minute 10"]}]
+    whole = simulate(steps, twin, truth=True)
+    monkeypatch.setattr(simulating, "BLOCK_ROWS", 300)
+    pieces = simulate(steps, twin, truth=True)
+    assert len(whole.run) == 300
+    np.testing.assert_allclose(pieces.run.gyro, whole.run.gyro, atol=1e-9)
+    part = whole.truth.contributions[id]
+    np.testing.assert_allclose(pieces.truth.contributions[id], part, atol=1e-9)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
