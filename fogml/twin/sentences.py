@@ -13,7 +13,7 @@ Actions within a step, at times counted from its beginning::
     power | fan | compressor | heater   on | off | at N % | automatic   [for TIME] [from minute M]
     humidity N % | automatic [for TIME] [from minute M]
     radiation at N Gy/h | off [for TIME] [from minute M]
-    yaw to ANGLE [at minute M]
+    yaw to ANGLE [for TIME] [at minute M]
 
 A moment is "minute 20", "hour 1", "second 30" or a time such as "1 h 30 min"; "from", "at" and
 "after" say the same.
@@ -163,8 +163,8 @@ def _setting(reader: SentenceReader, what: Switched) -> Setting:
     place = reader.place
     if what == "yaw":
         reader.expect("to")
-        return Setting(what, reader.quantity("angle"), reader.moment())
-    if what in AUTOMATIC and reader.take("automatic"):
+        value = reader.quantity("angle")
+    elif what in AUTOMATIC and reader.take("automatic"):
         value = None
     elif what == "humidity":
         reader.take("at")

@@ -77,7 +77,8 @@ switches = st.one_of(
         Setting, st.sampled_from(["compressor", "heater"]), st.none() | duties, starts, st.none() | times
     ),
     st.builds(Setting, st.just("humidity"), st.none() | st.floats(0, 100), starts, st.none() | times),
-    st.builds(Setting, st.just("yaw"), numbers, starts),
+    st.builds(Setting, st.just("yaw"), numbers, starts, st.none() | times),
+    st.builds(Setting, st.just("radiation"), st.floats(0, 100), starts, st.none() | times),
 )
 
 
