@@ -60,21 +60,23 @@ class Memory:
     ) -> FloatArray:
         """Mean of x over the newest `window_s` less that over the window before, shape (n,).
 
-        Where the samples' mean times are not a window apart, as at an interval that does not divide it, the
-        difference is taken in proportion: of samples two windows apart and more the slope to the one before.
-        Windows cut by the start, or by a gap that leaves the one before empty, take what there is, halved;
-        the first sample, and the first after a gap of two windows, have difference 0.
+        Means are over samples where those of the two windows lie a window apart. Where they do not, as at an
+        interval that does not divide it, or about a gap, they are those of a course that is linear between
+        samples. Windows cut by the start take what there is, halved; the first sample then has difference 0.
 
-        With `whole` nothing is taken in proportion, and samples two windows apart have difference 0.
+        With `whole` means are over samples throughout, and samples two windows apart have difference 0.
         """
-        known = self._histories.get(key, (np.empty(0), np.empty(0)))[0]
+        known_time, known_x = self._histories.get(key, (np.empty(0), np.empty(0)))
         step_x, step_t = self._steps(key, time, x, window_s)
         if whole:
             return np.where(step_t < 1.999999 * window_s, step_x, 0.0)
-        rows = np.flatnonzero(np.abs(step_t - window_s) > 1e-8 * window_s)
-        if len(rows):
-            share = _share_of_window(np.concatenate([known, time]), len(known) + rows, step_t[rows], window_s)
-            step_x[rows] *= share
+        apart = np.flatnonzero(np.abs(step_t - window_s) > 1e-8 * window_s)
+        if len(apart):
+            all_time, all_x = np.concatenate([known_time, time]), np.concatenate([known_x, x])
+            past = time[apart] - all_time[0] >= (2.0 - 1e-8) * window_s
+            cut, full = apart[~past], apart[past]
+            step_x[cut] *= window_s / np.maximum(step_t[cut], window_s)
+            step_x[full] = _difference_of_course(all_time, all_x, len(known_time) + full, window_s)
         return step_x
 
     def _steps(
@@ -168,14 +170,16 @@ def _neighbours(time: FloatArray, x: FloatArray, first: int) -> tuple[FloatArray
     return steps if first else (np.concatenate([[0.0], steps[0]]), np.concatenate([[0.0], steps[1]]))
 
 
-def _share_of_window(time: FloatArray, rows: IndexArray, step_t: FloatArray, window_s: float) -> FloatArray:
-    """What differences over `step_t` [s] at `rows` are multiplied by for one over a window, same shape."""
-    gap = np.diff(time, prepend=-np.inf) >= 1.999999 * window_s
-    begins = gap.copy()
-    # Samples that lie as far apart themselves leave no gap.
-    begins[1:] &= ~gap[:-1]
-    # Windows that no gap cuts: the first sample within them has one before it. A halved one is shorter.
-    oldest = np.searchsorted(time, time[rows] - (2.0 - 1e-8) * window_s, side="right")
-    full = (oldest > 0) & ~gap[oldest] & (step_t > 0.500001 * window_s) | (step_t > window_s)
-    scaled = np.divide(window_s, step_t, out=np.ones(len(rows)), where=full)
-    return np.where(begins[rows], 0.0, scaled)
+def _difference_of_course(time: FloatArray, x: FloatArray, rows: IndexArray, window_s: float) -> FloatArray:
+    """Differences at `rows` of the means of a course that is linear between samples."""
+    step, x = np.diff(time), x - x[0]
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * step)])
+    slope = np.divide(np.diff(x), step, out=np.zeros(len(step)), where=step > 0.0)
+
+    def integral(at: FloatArray) -> FloatArray:
+        i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(slope) - 1)
+        since = at - time[i]
+        return np.asarray(total[i] + since * (x[i] + 0.5 * since * slope[i]))
+
+    middle, start = (integral(time[rows] - back * window_s) for back in (1.0, 2.0))
+    return np.asarray((total[rows] - 2.0 * middle + start) / window_s)

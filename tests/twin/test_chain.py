@@ -38,16 +38,24 @@ def fresh(inputs):
 
 
 def delta(time, x):
-    """Mean of x over the last 64 s less that over the 64 s before, by plain selection of samples.
+    """Mean of x over the last 64 s less that over the 64 s before, where no window is cut by the start.
 
-    In proportion to 64 s where their mean times are not as far apart.
+    By plain selection of the samples where those of the two lie 64 s apart, else linear between samples.
     """
     out = np.full(len(x), np.nan)
+
+    def mean(start, stop):
+        at = np.unique(np.concatenate([[start, stop], time[(time > start) & (time < stop)]]))
+        return np.trapezoid(np.interp(at, time, x), at) / (stop - start)
+
     for i in range(len(x)):
-        new = (time > time[i] - 64.0) & (time <= time[i])
-        old = (time > time[i] - 128.0) & (time <= time[i] - 64.0)
-        if time[0] <= time[i] - 128.0 and old.any():
-            out[i] = 64.0 * (x[new].mean() - x[old].mean()) / (time[new].mean() - time[old].mean())
+        end, middle, start = time[i] - np.array([0.0, 64.0, 128.0])
+        if start >= time[0]:
+            new, old = (time > middle) & (time <= end), (time > start) & (time <= middle)
+            if old.any() and abs(time[new].mean() - time[old].mean() - 64.0) < 1e-6:
+                out[i] = x[new].mean() - x[old].mean()
+            else:
+                out[i] = mean(middle, end) - mean(start, middle)
     return out
 
 
