@@ -48,6 +48,9 @@ def logged(twin: Twin, output: FloatArray, inputs: Inputs, later: Later | None =
     """The output as it is recorded [deg/h], and what each logger effect changes in it."""
     parts: dict[str, FloatArray] = {}
     count = len(output)
+    if not count:
+        # A block in which the unit is off.
+        return ChainOutput(output, parts)
     if later is not None:
         time, output = np.append(inputs.time, later[0]), np.append(output, later[1])
     for declared, setting in twin.logging:
