@@ -157,3 +157,10 @@ def test_every_yaml_file_of_the_repository_is_read():
     assert len(paths) > 20
     for path in paths:
         assert read_yaml(path)
+
+
+@pytest.mark.parametrize("text", ["\x85", "a\x85b", "a\n\x85", "\u2028", "a\u2029 b"])
+def test_ends_of_line_of_other_kinds_read_back(text):
+    """PyYAML itself writes NEL as it stands, and reads it as a blank."""
+    written = yaml_text({"notes": text})
+    assert parse_yaml(written, "text") == yaml.safe_load(written) == {"notes": text}
