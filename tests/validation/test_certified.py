@@ -12,7 +12,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.signals.averages import freedom_of_deviation
 from fogml.validation.certified import sample_deviation
-from fogml.validation.scale_factor import find_steps, scale_factor_error
+from fogml.validation.scale_factor import Steps, find_steps, scale_factor_error
 
 
 def lagged(rng: np.random.Generator, share: float) -> np.ndarray:
@@ -48,6 +48,22 @@ def test_few_turns_tell_a_scale_factor_by_student_s_t() -> None:
     error = scale_factor_error(steps, gyro - 3600.0 * rate)
     assert error.se is not None and error.half_width == pytest.approx(error.se * t.ppf(0.95, 2), rel=1e-3)
     assert error.half_width > 1.5 * Z90 * error.se
+
+
+@pytest.mark.parametrize(
+    "rates", [(10.0, 10.0, 10.0), (1.0, 10.0, 100.0), (1.0, 1.0, 10.0, 10.0), (1.0, 10.0)]
+)
+def test_the_interval_of_a_scale_factor_holds_it_whatever_the_rates(rates: tuple[float, ...]) -> None:
+    """Steps up and down of each rate, scattered by equal noise of their heights; the truth is 0."""
+    rng = np.random.default_rng(7)
+    heights = 3600.0 * np.repeat(rates, 2) * np.tile([1.0, -1.0], len(rates))
+    places = np.arange(2 * len(heights)).reshape(-1, 2)
+    levels = np.column_stack((np.zeros(len(heights)), heights))
+    usable = np.arange(4 * len(heights))
+    steps = Steps(places, places + 2 * len(heights), levels, np.arange(len(heights)) // 2, usable)
+    found = [scale_factor_error(steps, rng.standard_normal(len(usable))) for _ in range(1500)]
+    held = np.mean([abs(one.overall) <= one.half_width for one in found])
+    assert 0.88 <= held <= 0.96
 
 
 @pytest.mark.parametrize("lag_s", [1.0, 2.0])
