@@ -89,7 +89,10 @@ class StressRelaxation(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         temperature, share = inputs.temperature("T"), shape["slow_share"]
-        tau = shape["time_constant"] * np.exp2(-0.1 * (temperature - 25.0))
+        # The mean of the rates at both ends: an error goes with the square of the interval.
+        pace = np.exp2(0.1 * (temperature - 25.0))
+        pace = 0.5 * (pace + inputs.memory.previous(f"{self.id} pace", pace))
+        tau = shape["time_constant"] / pace
         # q = T - lag of T solves the element's equation, for any tau(t).
         quick = inputs.memory.lag(f"{self.id} quick", inputs.time, temperature, tau)
         slow = inputs.memory.lag(f"{self.id} slow", inputs.time, temperature, self.slower * tau)
