@@ -14,8 +14,7 @@ from fogml.gap.frame import with_form_errors
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import foreseen
 from fogml.gap.model import TwinModel
-from fogml.gap.result import RunAmplitude
-from fogml.gap.result_parts import Onset
+from fogml.gap.result import Estimate, Onset, RunAmplitude
 from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.runs.steps import to_steps
@@ -58,10 +57,11 @@ def test_what_began_neither_grows_nor_disagrees_by_that():
     for one in scene.runs:
         one.time_s = np.array([30.0, 90.0])
     assert not agree(sizes) and growth(scene, sizes) > 0.0
-    acting = since(scene, sizes, Onset("r2", 30.0, 50.0))
+    size = Estimate(1.0, 0.01, "deg/h")
+    acting = since(scene, sizes, Onset("r2", 30.0, 50.0, size))
     assert acting == sizes[2:] and agree(acting) and growth(scene, acting) is None
     # Of a run in which it began a part alone shows it.
-    assert since(scene, sizes, Onset("r1", 90.0, 50.0)) == sizes[2:]
+    assert since(scene, sizes, Onset("r1", 90.0, 50.0, size)) == sizes[2:]
     assert since(scene, sizes, None) == sizes
 
 
