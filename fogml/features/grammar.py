@@ -33,8 +33,8 @@ from math import prod
 from fogml.errors import quoted
 from fogml.features.atoms import Atom
 from fogml.features.operands import OperandReader
-from fogml.features.operators import DEFAULT_WINDOW, METHODS, Window
-from fogml.features.own import own_operator, own_window
+from fogml.features.operators import DEFAULT_WINDOW, Window
+from fogml.features.own import METHODS, own_operator, own_window
 from fogml.features.signal import Signal
 from fogml.features.terms import Term
 from fogml.runs.columns import is_temperature

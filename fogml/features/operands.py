@@ -11,8 +11,7 @@ from typing import NoReturn, cast
 
 from fogml.errors import InputError, quoted
 from fogml.features.atoms import HYSTERESIS_DEGC, Atom
-from fogml.features.operators import METHODS
-from fogml.features.own import Function, Recursion
+from fogml.features.own import FUNCTIONS, METHODS, Function, Recursion
 from fogml.features.signal import NOT_INPUTS, TIME_ON, Signal, known_temperatures
 
 MOST_CHARACTERS = 10_000
@@ -98,7 +97,6 @@ class TokenReader:
         return quoted(self.token.text) if self.token.kind != "end" else "the end"
 
 
-FUNCTIONS = ("d", "diff", "sign", "lag", "play", "hysteresis", "since_on", "beyond")
 WINDOW_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
 _RATE_NAME = re.compile(r"d(T\w*)\Z", re.ASCII)

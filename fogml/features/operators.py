@@ -18,13 +18,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, known_are
-from fogml.features.own import Function, Recursion, State, declare, own_window
+from fogml.features.own import METHODS, Function, Recursion, State, declare, own_window
 from fogml.features.traced import decayed, forgotten, larger, smaller, where
 from fogml.numerals import number_text
 from fogml.signals import windows
@@ -32,8 +32,6 @@ from fogml.signals.clock import EDGE_TOLERANCE, EXPONENTIAL_SPAN, Clock
 from fogml.signals.kernel_windows import Kernel, kernel_rate
 from fogml.signals.memory import Lag, Play
 
-Method = Literal["block", "slope", "exp", "first"]
-METHODS: tuple[Method, ...] = get_args(Method)
 EXPONENTIAL_MEMORY = 40.0
 """Time constants after which an exponential window has forgotten to below float64 (e**-40)."""
 

@@ -19,6 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from types import ModuleType
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -30,6 +31,11 @@ from fogml.signals.kernel_windows import Kernel
 from fogml.signals.memory import MemoryOperator
 
 GROUP = "fogml.operators"
+Method = Literal["block", "slope", "exp", "first"]
+METHODS: tuple[Method, ...] = get_args(Method)
+"""How differences and rates are taken, of those that ship."""
+FUNCTIONS = ("d", "diff", "sign", "lag", "play", "hysteresis", "since_on", "beyond")
+"""Functions of feature text that ship; no operator of one's own has their names."""
 KINDS = ("s", "x", "1")
 """Kinds of parameters: a time, a number in the unit of the input, a plain number."""
 State = tuple[float, ...]
@@ -215,8 +221,10 @@ def declare(operator: Declared) -> Declared:
     Raises
     ------
     InputError
-        If another one has the name.
+        If another one has the name, or feature text has it for something else.
     """
+    if operator.name in (*FUNCTIONS, *METHODS):
+        raise InputError(f"operator {operator.name}: the name is feature text's own")
     known = _declared.setdefault(operator.name, operator)
     if known != operator:
         raise InputError(f"operator {operator.name}: the name is taken")

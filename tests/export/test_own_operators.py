@@ -193,6 +193,11 @@ def test_what_can_not_be_written_is_named():
         Kernel("flat", (1.0, 1.0))
     with pytest.raises(InputError, match="taken"):
         declare(replace(PEAK, name="bend"))
+    for name in ("d", "lag", "hysteresis", "beyond"):
+        with pytest.raises(InputError, match="feature text's own"):
+            declare(replace(PEAK, name=name))
+    with pytest.raises(InputError, match="feature text's own"):
+        declare(Kernel("slope", (1.0, 0.0)))
     with pytest.raises(InputError, match="a parameter of bend"):
         parse_features("bend(T)")
 

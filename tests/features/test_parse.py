@@ -13,7 +13,8 @@ from fogml.errors import InputError
 from fogml.features.atoms import Atom
 from fogml.features.features import Features
 from fogml.features.grammar import parse_terms
-from fogml.features.operators import METHODS, Window
+from fogml.features.operators import Window
+from fogml.features.own import METHODS
 from fogml.features.parse import parse_features
 from fogml.features.signal import TIME_ON, Signal
 from fogml.features.terms import Term
