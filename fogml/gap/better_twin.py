@@ -152,4 +152,4 @@ def diagnosed_plant(twin: Twin, runs: Sequence[Run]) -> tuple[PlantFit | None, s
         lacking = sorted(n for n in effect(id).needs if n.startswith("T_") and n not in recorded)
         if lacking:
             return None, f"Plant as it was: {id} follows {lacking[0]}, which was not recorded"
-    return fit_plant(twin.plant, runs), ""
+    return fit_plant(twin, runs), ""

@@ -22,7 +22,7 @@ from fogml.signals.clock import gap_starts
 from fogml.signals.smoothing import Smoothness, at_points, smoothed, window_difference
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, nominal_columns
-from fogml.twin.plant.fit import estimate_nodes
+from fogml.twin.plant.estimate import estimate_nodes
 from fogml.twin.replay import Replayer
 from fogml.twin.twin import Twin
 

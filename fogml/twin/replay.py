@@ -19,7 +19,7 @@ from fogml.twin.attitude import earth_field
 from fogml.twin.chain import hidden, through_chain
 from fogml.twin.effect import Effect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import REST, STAND_INS, Inputs
-from fogml.twin.plant.fit import estimate_nodes, recorded_power
+from fogml.twin.plant.estimate import estimate_nodes, recorded_power
 from fogml.twin.plant.heat import PowerWindows, windows_since
 from fogml.twin.recorder import logged
 from fogml.twin.truth import Truth

@@ -16,7 +16,7 @@ from fogml.twin.chain import through_chain
 from fogml.twin.effect import Effect
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
-from fogml.twin.plant.fit import EstimateState, estimate_nodes
+from fogml.twin.plant.estimate import EstimateState, estimate_nodes
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.plant.network import PlantState, ThermalNetwork
 from fogml.twin.recorder import chosen, logged

@@ -96,7 +96,7 @@ def test_a_plant_is_fitted_to_what_was_recorded():
     constants = ThermalConstants(case=1300.0, case_to_coil=240.0, coil=300.0, electronics=420.0)
     true = replace(load_twin("nominal"), plant=Plant(constants, heating=heating))
     runs = [simulate(STEPS, true, sample_s=20.0, seed=s, columns=COLUMNS).run for s in (1, 2)]
-    found = fit_plant(Plant(heating=heating), runs)
+    found = fit_plant(replace(true, plant=Plant(heating=heating)), runs)
     assert found is not None
     assert {"plant.case", "plant.case_to_coil", "plant.coil", "plant.electronics"} <= set(found.names)
     deviations = np.sqrt(np.diag(found.covariance))
@@ -110,15 +110,37 @@ def test_a_plant_is_fitted_through_a_power_cycle_that_leaves_no_rows():
     """What the twin's own sensors are off by is all that may be left of its true plant."""
     true = replace(load_twin("nominal"), plant=Plant(heating=SelfHeating(3.0, 3.0, 900.0)))
     steps = [*STEPS[:2], {STEPS[2]: ["power off for 20 min from minute 10"]}]
-    found = fit_plant(true.plant, [simulate(steps, true, sample_s=20.0, columns=COLUMNS).run])
+    found = fit_plant(true, [simulate(steps, true, sample_s=20.0, columns=COLUMNS).run])
     assert found is not None
     assert max(found.misfit_degc.values()) < 0.01  # 0.7 where it is taken to be on throughout
+
+
+@pytest.mark.parametrize(
+    ("effect", "actions"),
+    [
+        (None, ["fan off for 15 min"]),
+        (None, ["turn at 80 deg/s for 20 min"]),
+        (("airflow", 1.0), ["fan off for 15 min"]),
+        (("thermal_network", 0.4), []),
+    ],
+)
+def test_a_plant_is_fitted_beside_all_else_that_changes_it(effect, actions):
+    """Constants come back as they are: what fan, table and effects do is not in them once more."""
+    true = replace(load_twin("tactical"), settings={}, sensors=load_twin("nominal").sensors)
+    true = true if effect is None else true.with_effect(*effect)
+    steps = [STEPS[0], {STEPS[1]: actions}, STEPS[2]]
+    run = simulate(steps, true, sample_s=20.0, columns=[*COLUMNS, "fan", "rate", "angle"]).run
+    found = fit_plant(true, [run])
+    for name in ("case", "case_to_coil", "coil", "electronics"):
+        fitted, known = (getattr(plant.constants, name) for plant in (found.plant, true.plant))
+        assert fitted == pytest.approx(known, rel=0.02), name
+    assert max(found.misfit_degc.values()) < 0.01
 
 
 def test_without_air_or_another_node_no_plant_is_fitted():
     for columns in (["T_in", "T_out"], ["T_chamber"]):
         run = simulate(STEPS, "nominal", sample_s=60.0, columns=columns).run
-        assert fit_plant(Plant(), [run]) is None
+        assert fit_plant(load_twin("nominal"), [run]) is None
 
 
 def test_what_can_not_be_on_beside_another_is_drawn_by_neither_card():

@@ -12,7 +12,7 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.twin.plant.coil import RadialLine, with_line
-from fogml.twin.plant.fit import EstimateState, estimate_nodes, recorded_power
+from fogml.twin.plant.estimate import EstimateState, estimate_nodes, recorded_power
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.plant.standard import ThermalConstants, standard_network
 
