@@ -128,3 +128,8 @@ def test_a_power_that_lacks_a_reading_is_no_power_cycle() -> None:
     power = np.array([np.nan, 3.0, 3.0, np.nan, 3.0])
     run = Run.derived("a", {"time": np.arange(5.0), "gyro": np.zeros(5), "power": power}, Facts(), "deg/h")
     assert recorded_power(run) == ((-math.inf, math.inf),)
+
+
+def test_a_spike_of_the_power_does_not_switch_the_unit_off() -> None:
+    power = np.array([3.0, 2.9, 20.0, 2.8, 0.0, 0.1, 3.0, 2.9, 2.9, 2.9])
+    assert recorded_power(run(power=power)) == ((-math.inf, 4.0), (6.0, math.inf))

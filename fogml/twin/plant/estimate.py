@@ -89,8 +89,9 @@ def estimate_nodes(
 def recorded_power(run: Run) -> PowerWindows:
     """When the unit was on: from ``time_on`` of a simulated run, else from ``power`` or ``supply`` and facts.
 
-    On is above a fifth of the largest value; a column that is never above 0 tells nothing. A unit that is on
-    at the first sample was switched on at the fact ``powered_on``, or long before where that is not stated.
+    On is above a fifth of the largest value that two neighbouring samples reach; a column that is never above
+    0 tells nothing. A unit that is on at the first sample was switched on at the fact ``powered_on``, or long
+    before where that is not stated.
     """
     if TIME_ON in run.columns and len(run):
         return windows_since(run.time, read_time_on(run.columns[TIME_ON]))
@@ -101,7 +102,8 @@ def recorded_power(run: Run) -> PowerWindows:
         return ((earlier, math.inf),)
     held = np.isfinite(column)
     time, column = run.time[held], column[held]
-    on = column > _ON_SHARE * column.max()
+    # A reading that stands alone is a spike.
+    on = column > _ON_SHARE * np.minimum(column[1:], column[:-1]).max(initial=column.min())
     changes = time[1:][np.diff(on.astype(np.int8)) != 0].tolist()
     edges = [
         *([min(earlier, float(time[0]))] if on[0] else []),
