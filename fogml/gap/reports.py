@@ -257,9 +257,10 @@ def headline(
     first = min((runs.index(s.run) for s in segments), default=0)
     if first > 0:
         begun = min(s.from_s for s in segments if s.run == runs[first])
+        part = f", without {runs[first]} if it began within," if first + 1 < len(runs) else ""
         said.append(
             f"The gap shows from {runs[first]}, {begun:.0f} s, on, and in no run before: a diagnosis of the "
-            "runs from there on may name more."
+            f"runs from there on{part} may name more."
         )
     for h in far:
         if h.closed is None:
