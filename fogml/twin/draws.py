@@ -87,8 +87,7 @@ def moved(twin: Twin, name: str, by: float) -> Twin:
     if section == "effects":
         id, _, key = rest.partition(".")
         declared, setting = effect(id), twin.settings[id]
-        limits = {"amplitude": declared.amplitude.limits, **{q.name: q.limits for q in declared.shape}}
-        held = float(np.clip(value, *limits[key]))
+        held = {"amplitude": declared.amplitude, **{q.name: q for q in declared.shape}}[key].within(value)
         shape = {**setting.shape, **({key: held} if key != "amplitude" else {})}
         return twin.with_effect(id, held if key == "amplitude" else setting.amplitude, **shape)
     plant = twin.plant

@@ -78,8 +78,10 @@ class Uncertainty:
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """How far each parameter is from its value, in one draw."""
-        values, vectors = np.linalg.eigh(self.covariance)
-        off = vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(values)))
+        # In units of deviations: in a file's own, rounding of the large ones outdoes the small.
+        scale = np.sqrt(np.maximum(np.diag(self.covariance), np.finfo(np.float64).tiny))
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        off = scale * (vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(values))))
         return dict(zip(self.names, off.tolist()))
 
 

@@ -55,14 +55,15 @@ def test_the_twin_that_is_written_replays_as_well_as_is_said(tmp_path, id, ampli
     for constant in found.constants:
         assert abs(constant.value - truth[f"nominal.{constant.name}"]) < 4.0 * constant.se
     # Draws about the twin replay what the runs leave open, and the error of its form.
-    rng = np.random.default_rng(1)
-    for _ in range(3):
+    rng, moves = np.random.default_rng(1), []
+    for _ in range(9):
         drawn = written
         for name, by in written.uncertainty.drawn(rng).items():
             drawn = moved(drawn, name, by)
         apart = replay(drawn, made[2]) - replay(written, made[2])
-        moves = block_averages(made[2].time, apart, window_s=told.averaging_s).values[0]
-        assert np.sqrt(np.mean(moves**2)) < told.after + 0.05 * told.before
+        values = block_averages(made[2].time, apart, window_s=told.averaging_s).values[0]
+        moves.append(float(np.sqrt(np.mean(values**2))))
+    assert np.median(moves) < told.after + 0.05 * told.before
 
 
 @pytest.mark.parametrize(("modelled", "skew"), [(0.0, 28.0), (5.0, 20.0), (0.0, -50.0)])

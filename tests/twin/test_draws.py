@@ -57,6 +57,31 @@ def test_drawn_units_scatter_as_the_covariance_says():
     assert drawn[0].uncertainty is None and not drawn[0].suspected
 
 
+def test_draws_of_units_of_all_sizes_go_together_as_the_covariance_says():
+    """Of constants from 1e-7 to 1e3 in size that nearly determine each other, and one known for sure."""
+    rng = np.random.default_rng(4)
+    size = 10.0 ** rng.uniform(-7.0, 3.0, 12)
+    parts = rng.standard_normal((12, 4)) @ rng.standard_normal((4, 12)) + 3e-3 * rng.standard_normal((12, 12))
+    unit = parts @ parts.T
+    unit /= np.sqrt(np.outer(np.diag(unit), np.diag(unit)))
+    covariance = np.zeros((13, 13))
+    covariance[:12, :12] = unit * np.outer(size, size)
+    unsure = Uncertainty(tuple("abcdefghijklm"), covariance)
+    drawn = np.array([list(unsure.drawn(rng).values()) for _ in range(4000)])
+    assert (drawn[:, 12] == 0.0).all()
+    # Each direction of the units' own, the least varied ones too.
+    variances, directions = np.linalg.eigh(unit)
+    found = (drawn[:, :12] / size @ directions).var(axis=0)
+    assert found / variances == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_number_that_counts_is_drawn_as_one():
+    twin = load_twin("nominal").with_effect("fringe_jump", 2.0)
+    twin = replace(twin, uncertainty=Uncertainty(("effects.fringe_jump.amplitude",), np.array([[1.0]])))
+    drawn = [drawn_twin(twin, 0, number).settings["fringe_jump"].amplitude for number in range(50)]
+    assert all(value == round(value) for value in drawn) and np.std(drawn) > 0.5
+
+
 def test_what_is_switched_on_is_suspected_no_more():
     twin = unsure().with_effect("glass_transition")
     assert not twin.suspected and "glass_transition" in twin.settings
