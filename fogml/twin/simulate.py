@@ -90,7 +90,7 @@ def simulate(
         Unless stated, the unit is the twin's name and the notes say what was simulated; power-on is the
         programme's.
     truth
-        Whether to keep every node and every effect's contribution.
+        Whether to keep every node and every effect's contribution, as the run before has to have done.
     after
         The run of the same unit before: what the unit remembers goes on from it, over the time that the facts
         ``started`` of both tell. What is drawn at each power-on then follows from the first run's seed.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from dataclasses import replace
 from typing import Literal
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray
 from fogml.errors import InputError
+from fogml.runs.columns import is_temperature
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.twin.attitude import attitude, earth_field
@@ -119,12 +121,12 @@ class World:
             thermal = [declared.id for declared, _ in twin.thermal if not hidden(declared)]
             self._without = {id: Branch(twin.without_effect(id)) for id in thermal}
         self._drives = self._needed_drives()
+        self._sensor_memory = Memory()
         if before is not None:
             self._go_on_from(before, storage)
         self._noise = RandomErrors(twin, seed, len(self.timeline), sample_s, apart=truth)
         self._sensor_rng = Streams(seed, "sensor")
-        self._sensor_memory, self._share_memory = Memory(), Memory()
-        self._log_memory, self._free_memory = Memory(), Memory()
+        self._share_memory, self._log_memory, self._free_memory = Memory(), Memory(), Memory()
         self._acted: dict[str, bool] = {}
         self._check_sensors()
 
@@ -163,9 +165,15 @@ class World:
             raise InputError(f"{self.timeline.programme.name}: runs of one unit have one twin")
         self._seed = before._seed
         self._main.go_on_from(before._main)
+        if not self._without.keys() <= before._without.keys():
+            # Begun afresh, the unit without an effect would differ by all that it remembers.
+            raise InputError(
+                f"{self.timeline.programme.name}: its truth follows from that of the unit's run before, "
+                "which was not kept; ask for the truth of that run, too"
+            )
         for id, branch in self._without.items():
-            if id in before._without:
-                branch.go_on_from(before._without[id])
+            branch.go_on_from(before._without[id])
+        self._sensor_memory = deepcopy(before._sensor_memory)
         time = storage_times(before.end_s, self.clock_s)
         if not len(time):
             return
@@ -174,6 +182,9 @@ class World:
             nodes = stored_nodes(branch.network, time, storage, self._windows, branch.state)
             inputs = self._inputs(branch, time, nodes, np.zeros(len(time)), drives)
             through_chain(branch.twin, inputs, inputs)
+            if branch is self._main:
+                for name in filter(is_temperature, self.columns):
+                    self._sensed(name, inputs, Streams(self._seed, "storage"))
 
     def samples(self, block_rows: int) -> Iterator[Samples]:
         """What acts on the gyro at all samples, block by block."""
@@ -199,7 +210,10 @@ class World:
 
     def sensed(self, name: str, samples: Samples) -> FloatArray:
         """What the sensor behind a temperature column records."""
-        inputs = replace(samples.inputs, memory=self._sensor_memory)
+        return self._sensed(name, samples.inputs, self._sensor_rng)
+
+    def _sensed(self, name: str, inputs: Inputs, rng: Streams) -> FloatArray:
+        inputs = replace(inputs, memory=self._sensor_memory)
         place = self.twin.sensors.place(name)
         if len(place) == 1:
             temperature = inputs.temperature(next(iter(place)))
@@ -207,7 +221,7 @@ class World:
             temperature = sum(
                 (weight * inputs.temperature(node) for node, weight in place.items()), np.zeros(len(inputs))
             )
-        return sensed(self.twin, name, temperature, inputs, self._sensor_rng)
+        return sensed(self.twin, name, temperature, inputs, rng)
 
     def other_contributions(self, samples: Samples, output: FloatArray) -> dict[str, FloatArray]:
         """Contributions of the effects that are neither in the chain nor of the logger [deg/h]."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -16,6 +17,7 @@ from fogml.twin.inputs import Inputs
 from fogml.twin.registry import effect, effects
 from fogml.twin.replay import replay
 from fogml.twin.replay_after import Storage, replay_after, storage_times
+from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
@@ -247,3 +249,26 @@ def test_a_run_may_follow_at_once_though_times_are_rounded(sample_s: float, coun
     early = facts(sample_s * (count - 0.01) / 3600.0)
     with pytest.raises(InputError, match="ended"):
         simulate(steps, unit(), sample_s=sample_s, facts=early, after=first)
+
+
+def test_what_a_thermal_effect_makes_of_a_later_run_needs_the_truth_of_the_one_before() -> None:
+    twin = unit("thermal_network").with_nominal(b1=0.1)
+    first = simulate(RAMP, twin, sample_s=10.0, facts=facts())
+    assert simulate(DOWN, twin, sample_s=10.0, facts=facts(1.0), after=first).truth is None
+    with pytest.raises(InputError, match="not kept; ask for the truth of that run"):
+        simulate(DOWN, twin, sample_s=10.0, facts=facts(1.0), after=first, truth=True)
+
+
+@pytest.mark.parametrize("effect_too", [False, True])
+def test_a_sensor_goes_on_from_where_the_run_before_left_it(effect_too: bool) -> None:
+    """It is late by 60 s in a ramp that goes through both runs, and as late in a later run after storage."""
+    twin = replace(unit(*(["sensor_lag"] if effect_too else [])), sensors=Sensors(SensorErrors(lag=60.0)))
+    whole = simulate(["ramp to 55 degC at 1 degC/min"], twin, facts=facts()).run
+    first = simulate(["ramp to 40 degC at 1 degC/min"], twin, facts=facts())
+    rest = {"start_temperature": "40 degC", "steps": ["ramp to 55 degC at 1 degC/min"]}
+    on = Storage(40.0, powered=True)
+    second = simulate(rest, twin, facts=facts(0.25), after=first, storage=on).run
+    for name in ("T_in", "T_case"):
+        assert second.columns[name] == pytest.approx(whole.columns[name][900:], abs=1e-9)
+    stored = simulate(rest, twin, facts=facts(0.25 + 24.0), after=first, storage=Storage(40.0)).run
+    assert stored.columns["T_case"][:2] == pytest.approx(40.0, abs=0.01)
