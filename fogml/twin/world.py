@@ -80,6 +80,7 @@ class World:
 
     clock_s = 0.0
     """When the run starts on the unit's clock [s]."""
+    _dose_before = 0.0
 
     def __init__(
         self,
@@ -174,6 +175,8 @@ class World:
         for id, branch in self._without.items():
             branch.go_on_from(before._without[id])
         self._sensor_memory = deepcopy(before._sensor_memory)
+        ended = before.timeline.at(np.array([before.timeline.programme.total_s]))
+        self._dose_before = before._dose_before + float(ended.dose[0])
         time = storage_times(before.end_s, self.clock_s)
         if not len(time):
             return
@@ -302,7 +305,7 @@ class World:
         if "humidity" in needed:
             drives["humidity"] = block.humidity
         if "dose" in needed:
-            drives["dose"] = block.dose
+            drives["dose"] = self._dose_before + block.dose
         if "supply" in needed:
             drives["supply"] = np.full(len(block), outside.supply)
         if "power" in needed:

@@ -272,3 +272,21 @@ def test_a_sensor_goes_on_from_where_the_run_before_left_it(effect_too: bool) ->
         assert second.columns[name] == pytest.approx(whole.columns[name][900:], abs=1e-9)
     stored = simulate(rest, twin, facts=facts(0.25 + 24.0), after=first, storage=Storage(40.0)).run
     assert stored.columns["T_case"][:2] == pytest.approx(40.0, abs=0.01)
+
+
+def test_a_dose_stays_in_the_fibre_from_run_to_run() -> None:
+    """No gap and power left on: two runs are one programme, of which the first was irradiated."""
+    turning = "turn at 10 deg/s for 110 min from minute 5"
+    irradiated = {"soak at 25 degC for 2 h": ["radiation at 50 Gy/h for 1 h", turning]}
+    after = {"soak at 25 degC for 2 h": [turning]}
+    asked = {"sample_s": 10.0, "columns": ("T_in", "rate", "dose")}
+    twin, on = unit("radiation"), Storage(powered=True)
+    whole = simulate([irradiated, after, after], twin, facts=facts(), **asked).run
+    first = simulate([irradiated], twin, facts=facts(), **asked)
+    second = simulate([after], twin, facts=facts(2.0), after=first, storage=on, **asked)
+    third = simulate([after], twin, facts=facts(4.0), after=second, storage=on, **asked).run
+    for name in ("dose", "gyro"):
+        assert second.run.columns[name] == pytest.approx(whole.columns[name][720:1440], abs=1e-9)
+        assert third.columns[name] == pytest.approx(whole.columns[name][1440:], abs=1e-9)
+    assert replay_after(twin, third, [first.run, second.run]) == pytest.approx(third.gyro, abs=1e-9)
+    assert third.columns["dose"] == pytest.approx(50.0)
