@@ -86,8 +86,8 @@ def simulate(
     columns
         What to record beside time and gyro, by the run format's names; `DEFAULT_COLUMNS` if None.
     facts
-        Set-up facts; if None latitude 39.9 deg, and the input axis as the programme states it, or up.
-        Unless stated, the unit is the twin's name and the notes say what was simulated; power-on is the
+        Set-up facts; if None latitude 39.9 deg, and an input axis that is up. Unless stated, that is as the
+        programme says, the unit is the twin's name and the notes say what was simulated; power-on is the
         programme's.
     truth
         Whether to keep every node and every effect's contribution, as the run before has to have done.
@@ -227,13 +227,13 @@ def world_of(
     storage: Storage | None = None,
 ) -> World:
     """A world that has not begun; parameters as `simulate`, `before` is that of the unit's run before."""
-    if not isinstance(programme, Programme):
-        programme = load_programme(programme)
+    programme = programme if isinstance(programme, Programme) else load_programme(programme)
     unit = twin if isinstance(twin, Twin) else load_twin(twin)
     facts = default_facts(programme) if facts is None else facts
     steps = "steps of its own" if programme.name == "programme" else f"programme {programme.name}"
     notes = f"synthetic: {steps}, twin {unit.name}, seed {seed}"
-    stated = facts.model_copy(update={"unit": facts.unit or unit.name, "notes": facts.notes or notes})
+    usual = {"unit": unit.name, "notes": notes, "input_axis": programme.input_axis}
+    stated = facts.model_copy(update={key: getattr(facts, key) or value for key, value in usual.items()})
     counts = unit.counts_per_deg_h(sample_s)
     if counts is not None:
         if stated.scale_factor is not None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.runs.facts import Facts
+from fogml.runs.facts import EARTH_RATE_DEG_H, Facts
 from fogml.runs.reading import read_run
 from fogml.signals.allan import allan_deviation
 from fogml.twin import simulate as simulating
@@ -275,3 +275,14 @@ def test_a_sensor_needs_its_place():
 def test_a_run_of_bare_steps_says_so() -> None:
     notes = simulate(["soak at 25 degC for 10 min"], "tactical", seed=5).run.facts.notes
     assert notes == "synthetic: steps of its own, twin tactical, seed 5"
+
+
+def test_facts_that_state_no_input_axis_leave_it_to_the_programme() -> None:
+    """At 60 deg latitude an axis to the north sees half of Earth's rate, and turned to the west none."""
+    stated = Facts(latitude=60.0)
+    run = simulate("four-positions", Twin(), facts=stated).run
+    assert run.facts.input_axis == "north"
+    half = 0.5 * EARTH_RATE_DEG_H
+    assert run.gyro[[30, 100, 170, 240]] == pytest.approx([half, 0.0, -half, 0.0], abs=1e-9)
+    east = simulate("four-positions", Twin(), facts=stated.model_copy(update={"input_axis": "east"})).run
+    assert east.facts.input_axis == "east"
