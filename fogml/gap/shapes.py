@@ -241,8 +241,7 @@ def _grid(
 
 def is_angle(quantity: Quantity) -> bool:
     """Whether a shape parameter is a direction all round."""
-    low, high = quantity.tactical
-    return quantity.unit == "deg" and high - low >= 180.0
+    return quantity.all_round
 
 
 def is_line(quantity: Quantity) -> bool:

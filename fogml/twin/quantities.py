@@ -75,11 +75,24 @@ class Quantity:
             return 0.5 * math.log(low * high), 0.5 * math.log(high / low) / Z90, True
         return 0.5 * (low + high), 0.5 * (high - low) / Z90, False
 
+    @property
+    def all_round(self) -> bool:
+        """Whether it is a direction, of which none is more usual than others."""
+        low, high = self.tactical
+        return self.unit == "deg" and high - low >= 180.0
+
     def draw(self, rng: np.random.Generator, grade: Grade = "tactical") -> float:
-        """A value from the prior: log-normal with the range as its central 90 %, normal where
-        the range reaches zero or below; the sign is fair where `signed`; within `limits`."""
+        """A value from the prior, within `limits`; the sign is fair where `signed`.
+
+        Log-normal with the range as its central 90 %, normal where the range reaches zero or below, even over
+        the range where it is `all_round`.
+        """
         middle, spread, log = self.law(grade)
-        value = middle + spread * float(rng.standard_normal())
+        deviate = float(rng.standard_normal())
+        value = middle + spread * deviate
+        if self.all_round:
+            low, high = self.range(grade)
+            value = low + (high - low) * 0.5 * math.erfc(-deviate / math.sqrt(2.0))
         sign = float(rng.choice((-1.0, 1.0))) if self.signed else 1.0
         return self.within(sign * (math.exp(value) if log else value))
 
