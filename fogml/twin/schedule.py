@@ -5,7 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
+import numpy as np
+
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.numerals import number_text
 from fogml.twin.steps import (
@@ -45,6 +49,11 @@ class Track:
             self.values.pop()
         self.times.append(time)
         self.values.append(value)
+
+    @cached_property
+    def arrays(self) -> tuple[FloatArray, FloatArray]:
+        """Times and values of a track that is whole, shape (n,) each."""
+        return np.asarray(self.times), np.asarray(self.values)
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import sys
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.programme import Programme
-from fogml.twin.schedule import Schedule, Track
+from fogml.twin.schedule import Schedule
 from fogml.twin.steps import Switched
 from fogml.twin.table import Wave
 
@@ -98,6 +100,24 @@ class Timeline:
                 windows.append((start, end))
         return tuple(windows)
 
+    @cached_property
+    def set_point_knots(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Times [s], set points [degC] and the rates from there on [degC/min]."""
+        times, values = self.schedule.set_point.arrays
+        return times, values, np.append(60.0 * np.diff(values) / np.diff(times), 0.0)
+
+    @cached_property
+    def table_knots(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Times [s], rates [deg/s], accelerations [deg/s^2] and angles [deg], from rest at 0 s on."""
+        schedule = self.schedule
+        times, rates = schedule.table_rate.arrays
+        slopes = np.append(np.diff(rates) / np.diff(times), 0.0)[: len(times)]
+        knots = (times, rates, slopes, np.asarray(schedule.table_angle.values))
+        if len(times) == 0 or times[0] > 0.0:
+            first, second, third, fourth = (np.append(0.0, values) for values in knots)
+            return first, second, third, fourth
+        return knots
+
     def block(self, start: int, stop: int) -> TimelineBlock:
         """The samples from `start` to before `stop`."""
         time = np.arange(start, min(stop, len(self)), dtype=np.float64) * self.sample_s
@@ -139,25 +159,19 @@ class TimelineBlock:
     @cached_property
     def set_point(self) -> FloatArray:
         """Set point of the chamber [degC]."""
-        times, values, rates = self._set_point_knots
+        times, values, rates = self.timeline.set_point_knots
         return self._linear(times, values, rates / 60.0)
 
     @cached_property
     def set_rate(self) -> FloatArray:
         """Rate of the set point from each sample on [degC/min]."""
-        times, _, rates = self._set_point_knots
+        times, _, rates = self.timeline.set_point_knots
         return self._hold(times, rates)
-
-    @cached_property
-    def _set_point_knots(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Times [s], set points [degC] and the rates from there on [degC/min]."""
-        times, values = _arrays(self.timeline.schedule.set_point)
-        return times, values, np.append(60.0 * np.diff(values) / np.diff(times), 0.0)
 
     @cached_property
     def table_rate(self) -> FloatArray:
         """Table rate [deg/s], with the table's acceleration."""
-        times, rates, slopes, _ = self._table_knots
+        times, rates, slopes, _ = self.timeline.table_knots
         turning = self._linear(times, rates, slopes)
         for rows, phase, wave in self._waves:
             turning[rows] += wave.rate * np.sin(phase)
@@ -166,7 +180,7 @@ class TimelineBlock:
     @cached_property
     def angle(self) -> FloatArray:
         """Table angle [deg], not wrapped; 0 at the beginning."""
-        times, rates, slopes, angles = self._table_knots
+        times, rates, slopes, angles = self.timeline.table_knots
         turned = self._linear(times, angles, rates, 0.5 * slopes)
         for rows, phase, wave in self._waves:
             turned[rows] += wave.rate / (2.0 * math.pi * wave.frequency) * (1.0 - np.cos(phase))
@@ -175,23 +189,14 @@ class TimelineBlock:
     @property
     def _waves(self) -> Iterator[tuple[slice, FloatArray, Wave]]:
         """Samples of each oscillation that reaches into the block, with its phase [rad] there."""
-        for wave in self.timeline.schedule.waves:
+        waves, (begin, end) = self.timeline.schedule.waves, (self.time[[0, -1]] if len(self) else (0.0, 0.0))
+        for wave in islice(waves, bisect_left(waves, begin, key=lambda wave: wave.stop), None):
+            if wave.start > end:
+                return
             first, last = np.searchsorted(self.time, [wave.start, wave.stop])
             if last > first:
                 since = self.time[first:last] - wave.start
                 yield slice(first, last), 2.0 * math.pi * wave.frequency * since, wave
-
-    @cached_property
-    def _table_knots(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Times [s], rates [deg/s], accelerations [deg/s^2] and angles [deg], from rest at 0 s on."""
-        schedule = self.timeline.schedule
-        times, rates = _arrays(schedule.table_rate)
-        slopes = np.append(np.diff(rates) / np.diff(times), 0.0)[: len(times)]
-        knots = (times, rates, slopes, np.asarray(schedule.table_angle.values))
-        if len(times) == 0 or times[0] > 0.0:
-            first, second, third, fourth = (np.append(0.0, values) for values in knots)
-            return first, second, third, fourth
-        return knots
 
     @cached_property
     def powered(self) -> FloatArray:
@@ -235,7 +240,7 @@ class TimelineBlock:
         Left to itself the air of the room is shut in, and what freezes out below the dew point
         stays out: the coldest set point so far tells how much water is left.
         """
-        times, values, _ = self._set_point_knots
+        times, values, _ = self.timeline.set_point_knots
         coldest = self._hold(times, np.minimum.accumulate(values))
         shut_in = 0.01 * ROOM_HUMIDITY * saturation_pressure(np.array([ROOM_DEGC]))
         water = np.minimum(shut_in, saturation_pressure(np.minimum(coldest, self.set_point)))
@@ -244,7 +249,7 @@ class TimelineBlock:
     @cached_property
     def dose(self) -> FloatArray:
         """Radiation dose absorbed since the beginning [Gy]."""
-        times, rates = _arrays(self.timeline.schedule.settings["radiation"])
+        times, rates = self.timeline.schedule.settings["radiation"].arrays
         starts = np.maximum(times, 0.0)
         absorbed = np.concatenate([[0.0], np.cumsum(rates[:-1] * np.diff(starts))]) / 3600.0
         return self._linear(starts, absorbed, rates / 3600.0)
@@ -258,45 +263,48 @@ class TimelineBlock:
     def step(self) -> IndexArray:
         """Number of the step, counted from 0, repeats written out."""
         starts = np.asarray(self.timeline.schedule.step_starts)
-        return np.repeat(np.arange(len(starts)), self._samples_of(starts))
+        pieces, samples = self._samples_of(starts)
+        return np.repeat(np.arange(len(starts))[pieces], samples)
 
     def _given_or(self, what: Switched, automatic: FloatArray) -> FloatArray:
         given = self._held(what)
         return np.where(np.isnan(given), automatic, given)
 
     def _held(self, what: Switched) -> FloatArray:
-        return self._hold(*_arrays(self.timeline.schedule.settings[what]))
+        return self._hold(*self.timeline.schedule.settings[what].arrays)
 
     def _hold(self, times: FloatArray, values: FloatArray) -> FloatArray:
         """Values that hold from their times on."""
-        return np.repeat(values, self._samples_of(times))
+        pieces, samples = self._samples_of(times)
+        return np.repeat(values[pieces], samples)
 
     def _linear(
         self, times: FloatArray, values: FloatArray, slopes: FloatArray, bends: FloatArray | None = None
     ) -> FloatArray:
         """Values that go on from their times with a slope, and with a second-order term if there is one."""
-        samples = self._samples_of(times)
-        since = self.time - np.repeat(times, samples)
-        slope = np.repeat(slopes, samples)
+        pieces, samples = self._samples_of(times)
+        since = self.time - np.repeat(times[pieces], samples)
+        slope = np.repeat(slopes[pieces], samples)
         if bends is not None:
-            slope = slope + np.repeat(bends, samples) * since
-        return since * slope + np.repeat(values, samples)
+            slope = slope + np.repeat(bends[pieces], samples) * since
+        return since * slope + np.repeat(values[pieces], samples)
 
-    def _samples_of(self, times: FloatArray) -> IndexArray:
-        """Number of samples in each piece; a piece begins at its time, the clock's rounding apart.
+    def _samples_of(self, times: FloatArray) -> tuple[slice, IndexArray]:
+        """Those pieces that reach into the block, and the number of samples in each.
 
-        What comes before the first time belongs to the first piece.
+        A piece begins at its time, the clock's rounding apart; what comes before the first time belongs to
+        the first piece.
         """
         slack = _CLOCK_SLACK * self.timeline.sample_s
-        edges = np.searchsorted(self.time, times - slack)
+        first, last = (
+            np.searchsorted(times, self.time[[0, -1]] + slack, side="right") if len(self) else (1, 1)
+        )
+        pieces = slice(max(int(first) - 1, 0), max(int(last), 1))
+        edges = np.searchsorted(self.time, times[pieces] - slack)
         edges[:1] = 0
-        return np.diff(edges, append=len(self))
+        return pieces, np.diff(edges, append=len(self))
 
 
 def saturation_pressure(temperature: FloatArray) -> FloatArray:
     """Vapour pressure of saturated air over water [hPa], by Magnus' formula (Alduchov & Eskridge 1996)."""
     return np.asarray(6.1094 * np.exp(17.625 * temperature / (temperature + 243.04)))
-
-
-def _arrays(track: Track) -> tuple[FloatArray, FloatArray]:
-    return np.asarray(track.times), np.asarray(track.values)

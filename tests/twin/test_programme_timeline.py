@@ -212,3 +212,25 @@ def test_an_oscillation_is_a_sine_about_rest_and_comes_back() -> None:
 def test_what_an_oscillation_can_not_be_is_said(said: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         on_clock([{"hold for 30 s": [said]}], 0.5)
+
+
+def test_a_block_of_a_long_programme_looks_at_what_reaches_into_it() -> None:
+    """As the whole has it, oscillations and dose as well; of 3000 steps a block of 300 s takes a few."""
+    to_and_fro = {
+        "soak at 25 degC for 1 min": [
+            "oscillate at 2 deg/s and 0.1 Hz for 20 s",
+            "turn by 30 deg at 5 deg/s from second 30",
+            "radiation at 5 Gy/h for 10 s from second 20",
+        ]
+    }
+    programme = load_programme(
+        [{"repeat 1000 times": [to_and_fro, "ramp to 27 degC at 1 degC/min", "hold for 7 s"]}]
+    )
+    timeline = Timeline(programme, 1.0)
+    whole, block = timeline.whole, timeline.block(90_000, 90_300)
+    for name in ("set_point", "set_rate", "table_rate", "angle", "dose", "humidity", "compressor", "step"):
+        found, wanted = getattr(block, name), getattr(whole, name)[90_000:90_300]
+        assert np.abs(found - wanted).max() <= 1e-9 * max(np.abs(wanted).max(), 1.0), name
+    assert np.ptp(block.table_rate) > 6.0
+    pieces, samples = block._samples_of(timeline.set_point_knots[0])
+    assert pieces.stop - pieces.start < 12 and samples.sum() == 300
