@@ -26,7 +26,7 @@ from fogml.models.box import check_suits, distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.compact import Compact, compact_regressor
 from fogml.models.folds import dealt_folds
-from fogml.models.intervals import Intervals, interval_table, out_of_fold_intervals
+from fogml.models.intervals import Intervals, interval_table, out_of_fold_intervals, widened_to_use
 from fogml.models.linear import LinearRegressor
 from fogml.models.regressors import (
     fit_regressor,
@@ -50,8 +50,7 @@ from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
 
 _EACH_SENSOR = "{sensor}"
-_PREDICTED_VALUES = 1 << 19
-# Feature values composed at once: 4 MiB, which stays in the cache.
+_PREDICTED_VALUES = 1 << 19  # feature values composed at once: 4 MiB, which stays in the cache
 
 
 class SavedFeatures(Strict):
@@ -146,7 +145,9 @@ class FeatureModel(DriftModel):
     def _interval(self, rows: Sequence[RunRows]) -> Intervals:
         """Half-widths of the prediction interval, from parts of the training rows left out."""
         table = interval_table(rows)
-        return out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
+        found = out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
+        is_linear = isinstance(self.regressor_, LinearRegressor)
+        return found if is_linear else widened_to_use(found, rows, self._drift_at)
 
     def unfitted_regressor(self, width: int) -> Any:
         """An unfitted regressor for `width` columns."""
@@ -174,18 +175,19 @@ class FeatureModel(DriftModel):
 
     def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
         """The regressor's value of the features, atoms limited to the trained box."""
-        linear = goes_on_linearly(self.regressor_)
         values, full, settled = atoms
-        limited, outside = self.features_.limit(values, full, linear=linear)
-        drift = np.empty(len(values))
-        step = max(1, _PREDICTED_VALUES // len(self.features_))
+        limited, outside = self.features_.limit(values, full, linear=goes_on_linearly(self.regressor_))
+        measure = partial(distance_outside, values, outside, self.features_)
+        return Evaluation(self._drift_at(limited), full, settled, outside, measure)
+
+    def _drift_at(self, atoms: FloatArray) -> FloatArray:
+        """The regressor's value [deg/h] at rows of atoms, shape (n, a); a part of them at a time."""
+        drift, step = np.empty(len(atoms)), max(1, _PREDICTED_VALUES // len(self.features_))
         # Products of a matrix this narrow with a vector gain nothing from threads, but wait for them.
         with one_thread("blas") if isinstance(self.regressor_, LinearRegressor) else nullcontext():
-            for start in range(0, len(values), step):
-                piece = slice(start, start + step)
-                drift[piece] = predict_rows(self.regressor_, self.features_.compose(limited[piece]))
-        measure = partial(distance_outside, values, outside, self.features_)
-        return Evaluation(drift, full, settled, outside, measure)
+            for piece in (slice(start, start + step) for start in range(0, len(atoms), step)):
+                drift[piece] = predict_rows(self.regressor_, self.features_.compose(atoms[piece]))
+        return drift
 
     def stream(self, sample_s: float) -> FeatureStream:
         """The features sample by sample, limited as `evaluate` limits them.
@@ -231,8 +233,7 @@ class FeatureModel(DriftModel):
 
     def describe(self) -> dict[str, Any]:
         """What reports say of the model; for linear models with coefficients and standard errors."""
-        description = super().describe()
-        regressor = self.regressor_
+        description, regressor = super().describe(), self.regressor_
         description["regressor"] = type(regressor).__name__
         if isinstance(regressor, LinearRegressor):
             description["ridge"] = regressor.ridge_
@@ -321,9 +322,8 @@ def written_out(text: str, runs: Sequence[Run]) -> str:
     terms = [term.strip() for term in re.split(r",(?![^()\[\]]*[)\]])", text)]
     fixed = [term for term in terms if _EACH_SENSOR not in term]
     each = [term for term in terms if _EACH_SENSOR in term]
-    return ", ".join(
-        [*fixed, *[t.replace(_EACH_SENSOR, name) for name in shared_sensors(runs) for t in each]]
-    )
+    written = [term.replace(_EACH_SENSOR, name) for name in shared_sensors(runs) for term in each]
+    return ", ".join([*fixed, *written])
 
 
 def _part(rows: RunRows, features: Features) -> Part:

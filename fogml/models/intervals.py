@@ -199,6 +199,28 @@ def of_usual_averages(
     return replace(found, averaging_s=usual.averaging_s, half_widths=tuple(half.tolist()))
 
 
+def widened_to_use(
+    found: Intervals, rows: Sequence[RunRows], drift_at: Callable[[FloatArray], FloatArray]
+) -> Intervals:
+    """Half-widths no narrower than what the model leaves on its own rows, used sample by sample.
+
+    What bends makes more of a feature's noise at samples than at the averages of `interval_table`.
+
+    Parameters
+    ----------
+    found
+        Of averages.
+    rows
+        Training rows.
+    drift_at
+        The model's drift [deg/h] from atoms.
+    """
+    used = averaged_table(rows, lambda atoms: drift_at(atoms)[:, None], found.averaging_s)
+    own = intervals_from_residuals(used.y - used.X[:, 0], found.averaging_s, found.folds)
+    half = np.maximum(found.half_widths, own.half_widths)
+    return replace(found, half_widths=tuple(half.tolist()))
+
+
 def out_of_fold_intervals(
     table: TrainingTable,
     predicted: Callable[[TrainingTable, TrainingTable], FloatArray],

@@ -64,6 +64,18 @@ def test_intervals_hold_on_another_run_of_the_same_kind(level):
     assert abs(np.mean(held) - level) < 0.06
 
 
+def test_a_network_of_first_differences_holds_its_own_training_run() -> None:
+    """Of single samples differences are mostly noise, of averages they are not: their interval holds half."""
+    rng, time = np.random.default_rng(0), np.arange(20_000.0)
+    temperature = 40.0 * np.sin(2.0 * np.pi * time / 10_000.0)
+    drift = 30.0 * np.gradient(temperature) + 0.3 * rng.standard_normal(len(time))
+    read = temperature + 0.01 * rng.standard_normal(len(time))
+    model = make_model("rbf-patent").fit(Run.from_columns("run", time=time, gyro=drift, T=read))
+    left = drift - model.predict(Run.from_columns("run", time=time, gyro=drift, T=read))
+    averages = np.abs(left.reshape(-1, 100).mean(axis=1))
+    assert np.mean(averages <= model.intervals_.half_width(0.9)) >= 0.89
+
+
 def test_three_runs_are_left_out_whole():
     runs = [synthetic_run(f"{s}", 2.0, seed=s) for s in range(3)]
     shifted = [run.with_columns(gyro=run.gyro + step) for run, step in zip(runs, (0.0, 0.3, -0.3))]
