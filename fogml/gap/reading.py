@@ -210,7 +210,7 @@ def _even(
         smooth,
         powered=replayer.windows,
         fan=drives.get("fan"),
-        table_rate=even.table_rate,
+        table_rate=samples.means(np.abs(recorded.afresh().turning_deg_s)),
     )
     even = replace(even, temperatures={**nodes, **smooth}, cache={})
     return even, readings, noise

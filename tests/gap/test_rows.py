@@ -17,10 +17,13 @@ from fogml.gap.result import ConstantFit
 from fogml.gap.scene import Family, Scene, steps_are_coarse
 from fogml.gap.settings import Priors
 from fogml.gap.thermal_families import hidden_node
+from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.nominal import NAMES
 from fogml.twin.registry import effect
+from fogml.twin.set_up import Sensors
+from fogml.twin.simulate import simulate
 from fogml.twin.twin_file import load_twin
 
 NOISE = NoiseModel(0.005, 0.0, 0.0)
@@ -54,6 +57,22 @@ def test_columns_of_the_constants_are_what_a_replay_makes_of_them(sample_s):
         later = rows.end_s > time[0] + 300.0
         slack = (0.04 if name == "m" else 2e-3) * max(np.abs(told).max(), 1e-9)
         assert column[later] == pytest.approx(told[later], abs=slack), name
+
+
+def test_a_table_that_turns_across_the_axis_moves_the_air_as_in_a_simulation():
+    """The case follows the chamber the faster; the rate about a level axis on an upright table is 0."""
+    twin = replace(load_twin("tactical"), settings={}, sensors=Sensors())
+    steps = [
+        "soak at 25 degC for 1 h",
+        {"ramp to 60 degC at 1 degC/min": ["turn at 80 deg/s"]},
+        "soak at 60 degC for 1 h",
+    ]
+    facts = Facts(latitude=40.0, input_axis="north", table_axis="up")
+    columns = ["T_chamber", "T_in", "rate", "angle", "fan"]
+    made = simulate(steps, twin, sample_s=5.0, columns=columns, facts=facts, truth=True)
+    even = rows_of(made.run, twin, 400).even
+    case = np.interp(even.time, made.truth.time, made.truth.nodes["T_case"])
+    assert even.temperature("T_case") == pytest.approx(case, abs=0.05)  # 0.5 with the air of a table at rest
 
 
 def test_spikes_and_a_limit_of_the_output_are_masked():

@@ -132,8 +132,8 @@ class Airflow(ThermalEffect):
 
         G_air = G (1 + k fan) / (1 + k) * (1 + rotation_share k sqrt(|rate| / 100 deg/s))
 
-    relative to fan on and table at rest, for which time constants are stated. k is the amplitude. Sensors
-    show it, so that a replay lacks nothing.
+    relative to fan on and table at rest, for which time constants are stated. k is the amplitude; beyond 100
+    deg/s the air gains no more. Sensors show it, so that a replay lacks nothing.
 
     Source: convection (literature); ranges are engineering ones.
     """

@@ -78,7 +78,7 @@ class BiasInstability(NoiseEffect):
 
         S(f) = B**2 / (pi f) one-sided,      sigma(tau) = sqrt(2 ln 2 / pi) B = 0.664 B
 
-    Drawn for the whole record at once, with 1/f down to half of one over its length.
+    A simulation draws it sample after sample, with 1/f down to 1 / (2 pi 1e7 s).
 
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
