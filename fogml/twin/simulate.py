@@ -100,7 +100,7 @@ def simulate(
     Returns
     -------
     Simulation
-        Samples in which the unit is off are not recorded, as it gives no output then.
+        Samples in which the unit is off are not recorded: it gives no output, but remembers temperature.
 
     Raises
     ------
