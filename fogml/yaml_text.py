@@ -230,7 +230,15 @@ class _Dumper(yaml.SafeDumper):
         style = '"' if any(end in data for end in "\x85\u2028\u2029") else None
         return self.represent_scalar("tag:yaml.org,2002:str", data, style=style)
 
+    def represent_array(self, data: Any) -> yaml.Node:
+        """Numbers and arrays of numpy, as those of Python."""
+        if not hasattr(data, "tolist"):
+            raise TypeError(f"{data!r} is no plain value of a YAML file")
+        node: yaml.Node = self.represent_data(data.tolist())
+        return node
+
 
 _Dumper.add_representer(str, _Dumper.represent_str)
+_Dumper.add_multi_representer(object, _Dumper.represent_array)
 _Dumper.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+0123456789."))
 _Dumper.add_implicit_resolver("tag:yaml.org,2002:int", _OTHER_BASE, ["0"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from hypothesis import given, settings
@@ -164,3 +165,16 @@ def test_ends_of_line_of_other_kinds_read_back(text):
     """PyYAML itself writes NEL as it stands, and reads it as a blank."""
     written = yaml_text({"notes": text})
     assert parse_yaml(written, "text") == yaml.safe_load(written) == {"notes": text}
+
+
+def test_numbers_of_numpy_are_written_as_those_of_python():
+    found = {
+        "a": np.float64(0.1),
+        "b": np.int64(3),
+        "c": np.float32(0.25),
+        "d": np.arange(2.0),
+        "e": np.bool_(True),
+    }
+    assert parse_yaml(yaml_text(found), "a.yaml") == {"a": 0.1, "b": 3, "c": 0.25, "d": [0.0, 1.0], "e": True}
+    with pytest.raises(TypeError, match="no plain value"):
+        yaml_text({"a": object()})

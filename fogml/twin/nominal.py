@@ -10,11 +10,14 @@ DeltaT is the mean of T over the last 64 s less that over the 64 s before [degC]
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
+from numbers import Real
 
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.errors import InputError
 from fogml.twin.inputs import Inputs
 
 DELTA_WINDOW_S = 64.0
@@ -28,6 +31,11 @@ class NominalConstants:
 
     ``e0`` ppm, ``k1`` ppm/degC, ``k2`` ppm/degC**2, ``b0`` deg/h, ``b1`` deg/h/degC,
     ``b2`` deg/h/degC**2, ``g`` deg/h/degC, ``m`` deg/h/degC.
+
+    Raises
+    ------
+    InputError
+        If one is not a finite number.
     """
 
     e0: float = 0.0
@@ -38,6 +46,11 @@ class NominalConstants:
     b2: float = 0.0
     g: float = 0.0
     m: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+                raise InputError(f"nominal: '{name}' is {value!r}; a number in {UNITS[name]} is needed")
 
 
 UNITS = {

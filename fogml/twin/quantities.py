@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -104,7 +105,7 @@ class Quantity:
         InputError
             If it is not a finite number within `limits`; the message names owner and key.
         """
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
             raise InputError(f"{owner}: '{self.name}' is {value!r}; a number in {self.unit} is needed")
         if self.whole and value != round(value):
             raise InputError(f"{owner}: '{self.name}' is {value:g}; a whole number is needed")

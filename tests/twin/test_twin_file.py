@@ -6,6 +6,7 @@ import copy
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -165,3 +166,19 @@ def test_a_twin_is_never_changed_in_place():
         twin.without_effect("moisture")
     with pytest.raises(TypeError):
         twin.settings["ageing"] = changed.settings["ageing"]
+
+
+def test_numbers_of_numpy_make_a_twin_and_its_file(tmp_path):
+    """As means of recordings and loops over ranges give them."""
+    twin = load_twin("nominal").with_nominal(b0=np.mean([1.0, 2.0])).with_noise(N=np.float64(0.02))
+    twin = twin.with_effect("deadband", np.int64(2)).with_effect("sensor_lag", np.float32(30.0))
+    save_twin(twin, tmp_path / "twin.yaml")
+    back = load_twin(tmp_path / "twin.yaml")
+    assert (back.nominal.b0, back.noise.N) == (1.5, 0.02)
+    assert [setting.amplitude for setting in back.settings.values()] == [2.0, 30.0]
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "3", True])
+def test_a_constant_is_a_finite_number(value):
+    with pytest.raises(InputError, match="a number in deg/h is needed"):
+        load_twin("nominal").with_nominal(b0=value)
