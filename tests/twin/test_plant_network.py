@@ -11,8 +11,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fogml.errors import InputError
+from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.plant.network import PlantState, ThermalNetwork
 from fogml.twin.plant.standard import QUANTITIES, ThermalConstants, standard_network
+from fogml.twin.set_up import Plant
+from fogml.twin.twin import Twin
 
 NODES = ("T_case", "T_out", "T_in", "T_hub", "T_electronics", "T_plate")
 OFF_ON = ((-np.inf, 300.0), (1234.5, 5000.25))
@@ -105,6 +108,18 @@ def test_in_a_steady_ramp_each_node_is_behind_by_its_time_constants(order: int) 
 def test_smaller_orders_hold_the_same_heat(order: int) -> None:
     unit = sum(value for name, value in standard_network().capacities.items() if name != "T_plate")
     assert sum(standard_network(order=order).capacities.values()) == pytest.approx(unit, rel=1e-14)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4, 5, 6, 9])
+def test_a_twins_heat_comes_out_through_the_case_at_any_order(order: int) -> None:
+    """All of P leaves by the case's link to the air, (sum of C) / tau; a joined node heats its neighbour."""
+    plant = Plant(order=order, heating=SelfHeating(2.0, 2.0))
+    c = plant.constants
+    unit = c.case_capacity + c.coil_capacity + c.hub_capacity + c.electronics_capacity
+    warm = plant.network.temperatures(np.array([0.0]), np.array([25.0]))
+    assert warm["T_case"][0] == pytest.approx(25.0 + 2.0 * c.case / unit)
+    network = Twin(plant=plant).with_effect("self_heating", 7.0).network
+    assert network.heating.steady_w * network.steady_rises()["T_electronics"] == pytest.approx(7.0)
 
 
 def test_one_node_follows_the_closed_form_of_two_exponentials() -> None:

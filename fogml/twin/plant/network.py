@@ -286,7 +286,9 @@ class ThermalNetwork:
 
     @cached_property
     def _heated(self) -> FloatArray:
-        return np.array([float(name == self.heating.node) for name in self.nodes])
+        """Share of the heat that each node takes; one that is read from others heats those."""
+        where = self.readings.get(self.heating.node, {self.heating.node: 1.0})
+        return np.array([where.get(name, 0.0) for name in self.nodes])
 
     def _steady(self, flow: FloatArray) -> dict[str, float]:
         """Temperatures above the boundaries that carry a flow into each node away."""
