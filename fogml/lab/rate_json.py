@@ -87,7 +87,7 @@ def rate_json(
     read = _read(runs, settle_s)
     greatest = max((float(np.abs(p.rate).max()) for _, p in read.ladders if len(p)), default=0.0)
     main = _main_ladder(read, greatest, criteria)
-    line, held, doubts = (None, None, ()) if main is None else main
+    line, held, doubts, ladder = (None, None, (), []) if main is None else main
     scale = 1.0 if line is None else line.scale_factor
     small = _small(read, greatest, scale, criteria)
     zero, steps = (_by_size(answers) for answers in small)
@@ -118,6 +118,7 @@ def rate_json(
         },
         "count_arcsec": _count(runs),
         "told_by": {
+            "scale_factor": ladder,
             "threshold": list(small[0]),
             "resolution": list(small[1]),
             "temperature_sensitivity": [] if sensed is None else list(sensed.runs),
@@ -169,16 +170,18 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
 
 def _main_ladder(
     read: _Read, greatest: float, criteria: Criteria
-) -> tuple[Line, Range, tuple[str, ...]] | None:
+) -> tuple[Line, Range, tuple[str, ...], list[str]] | None:
     """Of the run, and the temperature, with the most different large rates against the greatest of all
-    [deg/h]; a scale factor that goes with temperature is no nonlinearity. With what to mind."""
+    [deg/h]; a scale factor that goes with temperature is no nonlinearity. With what to mind, and the run."""
     best: tuple[Line, Range, Run, Plateaus] | None = None
-    most = 0
+    most, short_of = 0, dict[str, float]()
     for run, whole in read.ladders:
         for plateaus in by_temperature(run, whole):
             found = scale_line(plateaus, criteria)
             rate = merged(plateaus.rate, plateaus.rate_error)
             levels = len(np.unique(rate[np.abs(rate) >= criteria.small * greatest]))
+            if found is not None and found[1].exceeded is not None:
+                short_of[run.name] = min(found[1].exceeded, short_of.get(run.name, np.inf))
             if found is not None and levels > most:
                 best, most = (*found, run, plateaus), levels
     if best is None:
@@ -186,7 +189,13 @@ def _main_ladder(
     line, held, run, plateaus = best
     followed = plateaus[np.abs(plateaus.rate) <= held.followed]
     within = nonlinearity_within(run, followed, line.scale_factor)
-    return replace(line, nonlinearity_ci90_ppm=within), held, _of_drift(run, followed)
+    # A range may go with temperature.
+    doubts = [
+        f"In {name} the output no longer follows {short(rate / 3600.0)} deg/s, which {run.name} follows."
+        for name, rate in short_of.items()
+        if rate <= held.followed
+    ]
+    return replace(line, nonlinearity_ci90_ppm=within), held, (*doubts, *_of_drift(run, followed)), [run.name]
 
 
 def _of_drift(run: Run, plateaus: Plateaus, most: float = 0.1, steady_degC: float = 0.5) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ def _ladder(values: Mapping[str, Any]) -> tuple[str, Markup, str] | None:
     line, held = values["scale_factor"], values["range"]
     if line is None:
         return None
-    told = max(values["ladder"], key=lambda one: np.abs(one["rate_deg_h"]).max())
+    (told,) = (one for one in values["ladder"] if one["run"] in values["told_by"]["scale_factor"])
     rate, output = np.asarray(told["rate_deg_h"]), np.asarray(told["output_deg_h"])
     order = np.argsort(rate)
     rate, output = rate[order], output[order]

@@ -18,6 +18,8 @@ from fogml.lab.rate_programmes import rate_runs
 from fogml.lab.rate_response import bandwidth, gain_of
 from fogml.lab.rate_tests import Answer, Criteria, least_seen
 from fogml.lab.rate_words import bracketed, result_rows
+from fogml.pictures import Curve
+from fogml.report import rate_page as page
 from fogml.report.rate_page import rate_page
 from fogml.runs.checks import check_run
 from fogml.runs.facts import Facts
@@ -104,6 +106,27 @@ def test_the_slew_of_a_saturated_output_is_the_tables_and_no_rows(scale: float) 
     told = rate_json([run], source="a run")["slew"]
     assert told["output_deg_s2"] == pytest.approx(50.0, rel=0.01)
     assert told["table_deg_s2"] == pytest.approx(50.0, rel=0.01) and not told["limited"]
+
+
+def test_the_picture_is_of_the_ladder_that_the_line_is_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One ladder of many rates, and one that is cut off at 250 deg/s, whose rates are as great."""
+    ladders = {
+        "many": np.array([0, 50, -50, 100, -100, 200, -200, 300, -300.0]),
+        "few": np.array([0, 300, -300.0]),
+    }
+    runs = []
+    for name, rates in ladders.items():
+        rate = np.repeat(rates, 60)
+        output = 1.0002 * rate if name == "many" else np.clip(rate, -250.0, 250.0)
+        gyro = 3600.0 * output + np.random.default_rng(1).standard_normal(len(rate))
+        runs.insert(0, Run(name, {"time": 1.0 * np.arange(len(rate)), "gyro": gyro, "rate": rate}, Facts()))
+    told = rate_json(runs, source="two runs")
+    assert told["told_by"]["scale_factor"] == ["many"] and told["range"]["followed_deg_s"] == 300.0
+    assert "In few the output no longer follows 300 deg/s, which many follows." in told["notes"]
+    drawn: list[Curve] = []
+    monkeypatch.setattr(page, "line_figure", lambda curves, *_, **__: drawn.extend(curves))
+    page._ladder(told)
+    assert len(drawn[0].x) == len(ladders["many"]) and np.nanmax(np.abs(drawn[0].y)) < 5.0
 
 
 def test_a_lag_is_no_slew_limit() -> None:
