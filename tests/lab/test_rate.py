@@ -110,10 +110,8 @@ def test_the_slew_of_a_saturated_output_is_the_tables_and_no_rows(scale: float) 
 
 def test_the_picture_is_of_the_ladder_that_the_line_is_of(monkeypatch: pytest.MonkeyPatch) -> None:
     """One ladder of many rates, and one that is cut off at 250 deg/s, whose rates are as great."""
-    ladders = {
-        "many": np.array([0, 50, -50, 100, -100, 200, -200, 300, -300.0]),
-        "few": np.array([0, 300, -300.0]),
-    }
+    many = np.array([0, 50, -50, 100, -100, 200, -200, 300, -300.0])
+    ladders = {"many": many, "few": np.array([0, 100, -100, 300, -300.0])}
     runs = []
     for name, rates in ladders.items():
         rate = np.repeat(rates, 60)
@@ -126,7 +124,7 @@ def test_the_picture_is_of_the_ladder_that_the_line_is_of(monkeypatch: pytest.Mo
     drawn: list[Curve] = []
     monkeypatch.setattr(page, "line_figure", lambda curves, *_, **__: drawn.extend(curves))
     page._ladder(told)
-    assert len(drawn[0].x) == len(ladders["many"]) and np.nanmax(np.abs(drawn[0].y)) < 5.0
+    assert len(drawn[0].x) == len(many) and np.nanmax(np.abs(drawn[0].y)) < 5.0
 
 
 def test_a_lag_is_no_slew_limit() -> None:
