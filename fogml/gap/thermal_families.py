@@ -57,9 +57,14 @@ def scale_factor_hysteresis(rows: Rows, scene: Scene, constants: Constants) -> I
         yield block._replace(columns=rows.per_ppm[:, None] * block.columns)
 
 
+def _switched_on(rows: Rows) -> bool:
+    """Whether a power-on is known, before the run or within it."""
+    return math.isfinite(rows.even.powered_on_s) or bool(rows.even.power_ons_s)
+
+
 def warm_up(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """Any decay since power-on."""
-    if math.isfinite(rows.even.powered_on_s):
+    if _switched_on(rows):
         yield column_block(*(rows.of(rows.even.unwarmed(tau)) for tau in scene.grids.warm_ups_s))
     else:
         yield Block(np.zeros((len(rows), len(scene.grids.warm_ups_s))))
@@ -185,7 +190,7 @@ def scale_factor_node(rows: Rows, scene: Scene, constants: Constants) -> Iterato
 def modulator(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """A scale factor that follows the modulator's temperature, with a second loop that corrects it late."""
     speed, lags_s = rows.per_ppm[:, None], scene.grids.modulator_s
-    on = np.isfinite(rows.even.powered_on_s)
+    on = _switched_on(rows)
     starts = [rows.of(rows.even.unwarmed(s)) * 100.0 if on else np.zeros(len(rows)) for s in lags_s]
     for place in scene.optics(rows, scene.grids.electronics_mixes):
         x = rows.of(place.temperature) - 25.0

@@ -16,7 +16,7 @@ from fogml.gap.reports import assumed
 from fogml.gap.result import ConstantFit
 from fogml.gap.scene import Family, Scene, steps_are_coarse
 from fogml.gap.settings import Priors
-from fogml.gap.thermal_families import hidden_node
+from fogml.gap.thermal_families import hidden_node, warm_up
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -73,6 +73,22 @@ def test_a_table_that_turns_across_the_axis_moves_the_air_as_in_a_simulation():
     even = rows_of(made.run, twin, 400).even
     case = np.interp(even.time, made.truth.time, made.truth.nodes["T_case"])
     assert even.temperature("T_case") == pytest.approx(case, abs=0.05)  # 0.5 with the air of a table at rest
+
+
+def test_a_power_cycle_of_a_unit_that_was_warm_starts_its_warm_up():
+    """Off for an hour in the middle: a decay since then, as much of it as the unit cooled by."""
+    made = _cycle()
+    on = (made.time < 5000.0) | (made.time >= 8600.0)
+    run = Run.from_columns("a", **made.columns, power=np.where(on, 3.0, 0.0))
+    rows = rows_of(run, load_twin("nominal"), 600)
+    grids = Priors().grids
+    (block,) = warm_up(rows, SimpleNamespace(grids=grids), {})
+    since = rows.end_s - 0.5 * rows.row_s - 8600.0
+    later = since > rows.row_s
+    for tau, column in zip(grids.warm_ups_s, block.columns.T, strict=True):
+        wanted = (1.0 - np.exp(-3600.0 / tau)) * np.exp(-since[later] / tau)
+        assert column[later] == pytest.approx(wanted, rel=0.02)
+        assert not column[since < -3700.0].any()
 
 
 def test_spikes_and_a_limit_of_the_output_are_masked():
