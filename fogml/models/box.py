@@ -109,6 +109,11 @@ def moves_both_ways(temperatures: Sequence[FloatArray]) -> bool:
     return len(ways_moved(temperatures)) == 2
 
 
+def each_moves_both_ways(temperatures: Sequence[FloatArray]) -> bool:
+    """Whether every run's temperature does: its course tells drift with temperature from drift in time."""
+    return all(moves_both_ways([T]) for T in temperatures)
+
+
 def direction_is_told(temperatures: Sequence[FloatArray]) -> bool:
     """Whether what the direction of temperature does is told beside what shifts a run as a whole.
 

@@ -13,7 +13,7 @@ from fogml.features.atoms import HYSTERESIS_DEGC
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.signal import TIME_ON, held_by
-from fogml.models.box import moves_both_ways
+from fogml.models.box import each_moves_both_ways, moves_both_ways
 from fogml.models.combination import (
     LeftOut,
     SharedMember,
@@ -28,7 +28,7 @@ from fogml.models.intervals import Intervals, of_usual_averages
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import SizePriors, fit_mixed_effects
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
-from fogml.models.weights import intervals_of, weights_of
+from fogml.models.weights import intervals_of, shifts_apart, weights_of
 from fogml.numerals import percent, short
 from fogml.runs.run import Run
 
@@ -77,7 +77,11 @@ class MixedEffectsModel(FeatureModel):
         self.max_rows = None
 
     def _chosen_features(self, runs: Sequence[Run]) -> Features:
-        self._both_ways = moves_both_ways([run.temperature("T") for run in runs])
+        temperatures = [run.temperature("T") for run in runs]
+        self._both_ways, self._courses_tell = (
+            moves_both_ways(temperatures),
+            each_moves_both_ways(temperatures),
+        )
         return offered(runs) if self.features is None else resolve_features(self.features, runs)
 
     def _fit_rows(self, rows: Sequence[RunRows], features: Features) -> int:
@@ -87,7 +91,7 @@ class MixedEffectsModel(FeatureModel):
         T = temperatures_of(table, features)
         member, shared = self._shared_part(features, columns)
         parts = left_out([member], features, table, left_out_parts(table, T))
-        weights = self._kept(parts)
+        weights = self._kept(shifts_apart(parts) if self._courses_tell else parts)
         self.skill_ = float(weights[0])
         mean = float(table.y.mean())
         _, self.regressor_ = combined([(features, shared)], weights, mean)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
-from fogml.models.box import direction_is_told, learn_box, moves_both_ways
+from fogml.models.box import direction_is_told, each_moves_both_ways, learn_box, moves_both_ways
 from fogml.models.candidates import Candidate, Score, candidates_for, candidates_of, choose, union_of
 from fogml.models.folds import Fold, dealt_blocks, run_folds, time_folds
 from fogml.models.linear import LinearRegressor
@@ -25,6 +26,7 @@ from fogml.models.regressors import (
     predict_rows,
 )
 from fogml.models.table import RunRows, TrainingTable, recorded_s, row_count, run_rows
+from fogml.models.weights import shift_share
 from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 
@@ -68,6 +70,7 @@ class Trial:
         temperatures = [run.temperature("T") for run in runs]
         self.both_directions = moves_both_ways(temperatures)
         self.direction_told = direction_is_told(temperatures)
+        self._courses_tell = each_moves_both_ways(temperatures)
         self.candidates = (
             candidates_of(features)
             if features
@@ -105,24 +108,43 @@ class Trial:
         that lack next to nothing. Both count alike.
         """
         table = self._table
-        parameters = 1
         squares, rows = [], []
         for folds in self._partings:
-            predicted = np.empty(len(table))
-            for fitted, held in folds:
-                if not candidate.features:
-                    predicted[held] = table.y[fitted].mean()
-                    continue
-                features = parse_features(candidate.features)
-                atoms = self._atoms[:, [self._column[atom.text] for atom in features.atoms]]
-                predicted[held], parameters = held_out_prediction(
-                    regressor_for(candidate, self.seed), features, atoms, self._table, fitted, held
-                )[:2]
-            by_block = squares_by_block(table, predicted)
+            predicted, parameters = self._predicted(candidate, folds)
+            by_block = squares_by_block(table, self._apart(table.y - predicted))
             squares.append(by_block[0])
             rows.append(by_block[1])
         of_runs = len(rows[0]) if self.several_runs else None
         return Score(candidate, parameters, np.concatenate(squares), np.concatenate(rows), of_runs)
+
+    def _predicted(self, candidate: Candidate, folds: Sequence[Fold]) -> tuple[FloatArray, int]:
+        """What a candidate foretells of each row while its fold is held out, and its number of parameters."""
+        predicted, parameters = np.empty(len(self._table)), 1
+        for fitted, held in folds:
+            if not candidate.features:
+                predicted[held] = self._table.y[fitted].mean()
+                continue
+            features = parse_features(candidate.features)
+            atoms = self._atoms[:, [self._column[atom.text] for atom in features.atoms]]
+            predicted[held], parameters = held_out_prediction(
+                regressor_for(candidate, self.seed), features, atoms, self._table, fitted, held
+            )[:2]
+        return predicted, parameters
+
+    def _apart(self, errors: FloatArray) -> FloatArray:
+        """Errors with the mean of each run as far as it counts."""
+        index = self._table.run_index
+        means = np.bincount(index, errors) / np.maximum(np.bincount(index), 1)
+        return errors - (1.0 - self._shift_share) * means[index]
+
+    @cached_property
+    def _shift_share(self) -> float:
+        """How far the mean of a run counts beside its course, by what the standard form leaves of it."""
+        if not (self.several_runs and self._courses_tell):
+            return 1.0
+        folds, told = self._partings[0], self._table.y
+        left = told - self._predicted(self.candidates[0], folds)[0]
+        return shift_share([left[held] for _, held in folds], [told[held] for _, held in folds])
 
     def chosen(self, scores: Sequence[Score]) -> Score:
         """The score of the candidate that these runs speak for."""
@@ -164,9 +186,9 @@ def held_out_prediction(
     return predict_rows(regressor, features.compose(limited)), parameter_count(regressor), regressor
 
 
-def squares_by_block(table: TrainingTable, predicted: FloatArray) -> tuple[FloatArray, IndexArray]:
+def squares_by_block(table: TrainingTable, errors: FloatArray) -> tuple[FloatArray, IndexArray]:
     """Mean squared error [(deg/h)**2] and number of rows of each of a table's b blocks, shapes (b,)."""
-    squares = (table.y - predicted) ** 2
+    squares = errors**2
     starts = np.flatnonzero(np.diff(table.block, prepend=-1))
     counts = np.diff(starts, append=len(table))
     return np.add.reduceat(squares, starts) / counts, counts

@@ -14,7 +14,7 @@ from fogml.arrays import FloatArray
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
-from fogml.models.box import learn_box, moves_both_ways
+from fogml.models.box import each_moves_both_ways, learn_box, moves_both_ways
 from fogml.models.candidates import Candidate
 from fogml.models.card import hash_ahead, training_card
 from fogml.models.combination import (
@@ -36,7 +36,7 @@ from fogml.models.mixed_effects import fit_mixed_effects, linear_regressor
 from fogml.models.mixed_effects_model import averages_of, composed, offered, static_features
 from fogml.models.table import TrainingTable, run_rows
 from fogml.models.trial import fit_candidate
-from fogml.models.weights import intervals_of, weights_of
+from fogml.models.weights import intervals_of, shifts_apart, weights_of
 from fogml.numerals import percent, short
 from fogml.runs.run import Run
 
@@ -121,19 +121,28 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
         members[choice.name] = FittedMember(simple.features_, regressor)
     parts = left_out_parts(table, temperatures_of(table, union))
     lefts = left_out(list(members.values()), union, table, parts)
-    both_ways = moves_both_ways([run.temperature("T") for run in runs])
+    temperatures = [run.temperature("T") for run in runs]
+    both_ways, courses_tell = moves_both_ways(temperatures), each_moves_both_ways(temperatures)
     must_improve_on = [STATIC] if len(runs) > 1 else []
     must_improve_on += [choice.name] if one_rate else []
     beside = [place for place, name in enumerate(members) if name in must_improve_on]
-    weights = weights_of(lefts, len(members), both_ways, beside)
+    apart = shifts_apart(lefts) if courses_tell else lefts
+    weights = weights_of(apart, len(members), both_ways, beside)
+    if not _rms(apart, weights) ** 2 < (1.0 - LEAST_WEIGHT) * _rms(apart, 0.0 * weights) ** 2:
+        weights = 0.0 * weights
     left, mean_left = _rms(lefts, weights), _rms(lefts, 0.0 * weights)
-    if not left**2 < (1.0 - LEAST_WEIGHT) * mean_left**2:
-        weights, left = 0.0 * weights, mean_left
     if simple is not None and choice.network and simple.features_ is not None:
         own_member = FittedMember(simple.features_, regressor)
-        alone = _rms(left_out([own_member], union, table, parts), np.ones(1))
-        if alone < CLEARLY * left:
-            return Weighed(simple, {choice.name: 1.0}, alone, mean_left, (own_member,), table, union)
+        alone = left_out([own_member], union, table, parts)
+        both = [
+            replace(one, predicted=np.column_stack((one.predicted, other.predicted)))
+            for one, other in zip(lefts, alone, strict=True)
+        ]
+        both = shifts_apart(both) if courses_tell else both
+        others, network = np.append(weights, 0.0), np.append(0.0 * weights, 1.0)
+        if _rms(both, network) < CLEARLY * _rms(both, others):
+            left = _rms(alone, np.ones(1))
+            return Weighed(simple, {choice.name: 1.0}, left, mean_left, (own_member,), table, union)
     errors = errors_of_all(list(members.values()), union, table)
     intervals = intervals_of(lefts, weights, table, both_ways, errors)
     chosen = [

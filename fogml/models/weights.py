@@ -111,6 +111,39 @@ def asked_of(parts: Sequence[LeftOut], both_ways: bool) -> list[LeftOut]:
     return runs or [part for part in parts if part.kind == ("blocks" if both_ways else "halves")]
 
 
+def shift_share(left: Sequence[FloatArray], told: Sequence[FloatArray]) -> float:
+    r"""How far the mean of a run counts beside its course, 0 to 1, of runs left out.
+
+    A run is shifted as a whole, by its power-on or its mounting, which nothing that a model knows foretells.
+    What is left has the variance :math:`s^2` about the runs' means, and these the mean square :math:`b^2`.
+    They count by the factor :math:`s/\sqrt{s^2 + b^2}`, near 1 where runs agree: so what tells courses is not
+    drowned in shifts. Where it does not tell them, as of runs at one temperature each, means count whole.
+
+    Parameters
+    ----------
+    left, told
+        What is left of each run, and what is told of it [deg/h].
+    """
+    course, whole = (float(np.mean([np.var(one) for one in parts])) for parts in (left, told))
+    shift = float(np.mean([np.mean(one) ** 2 for one in left]))
+    return float(np.sqrt(course / (course + shift))) if 0.0 < course < (1.0 - LEAST_WEIGHT) * whole else 1.0
+
+
+def shifts_apart(parts: Sequence[LeftOut]) -> list[LeftOut]:
+    """Parts that are runs, their means by the `shift_share` of the member that tells their courses best."""
+    runs = [part for part in parts if part.kind == "runs"]
+    if not runs:
+        return list(parts)
+    lefts = [[part.told - part.predicted[:, m] for part in runs] for m in range(runs[0].predicted.shape[1])]
+    best = min(lefts, key=lambda left: np.mean([np.var(one) for one in left]))
+    share = shift_share(best, [part.told for part in runs])
+
+    def apart(values: FloatArray) -> FloatArray:
+        return values - (1.0 - share) * values.mean(axis=0)
+
+    return [replace(part, told=apart(part.told), predicted=apart(part.predicted)) for part in runs]
+
+
 def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
     r"""Share of the weighed sum that left-out parts confirm, 0 to 1; all of it where there are none.
 

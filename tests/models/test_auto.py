@@ -14,6 +14,7 @@ from fogml.features.parse import parse_features
 from fogml.models import trial
 from fogml.models.auto import AutoModel
 from fogml.models.candidates import STANDARD, Candidate, Score, candidates_for, choose
+from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
@@ -239,6 +240,20 @@ def test_left_out_runs_reveal_what_one_run_hides(linear_only: None) -> None:
         runs.append(run.with_columns(gyro=drift + noise))
     assert any(AutoModel().fit(runs[:1]).weighed_.weights.values())
     assert not any(AutoModel().fit(runs).weighed_.weights.values())
+
+
+@pytest.mark.parametrize("kind", ["auto", "mixed-effects"])
+def test_what_shifts_a_run_as_a_whole_hides_no_drift_with_temperature(kind: str, linear_only: None) -> None:
+    """Full cycles, shifted by nothing or by far more than the drift: the same is left of it."""
+    left = []
+    for shifts in ((0.0, 0.0, 0.0), (4.0, -2.0, 1.0)):
+        shifted = [world_run(1.0, seed)[0] for seed in range(3)]
+        shifted = [run.with_columns(gyro=run.gyro + shift) for run, shift in zip(shifted, shifts)]
+        *train, test = shifted
+        drift = make_model(kind).fit(train).predict(test)
+        left.append(np.std(test.error_deg_h - drift) / np.std(test.error_deg_h))
+    assert left[0] < 0.5
+    assert left[1] == pytest.approx(left[0], rel=0.05)
 
 
 @pytest.mark.parametrize("axis", ["x", "z"])

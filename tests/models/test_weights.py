@@ -9,7 +9,7 @@ from fogml.models.box import direction_is_told
 from fogml.models.combination import LeftOut, combined
 from fogml.models.linear import LinearRegressor
 from fogml.models.table import TrainingTable
-from fogml.models.weights import intervals_of, skill_of, weights_of
+from fogml.models.weights import intervals_of, shift_share, shifts_apart, skill_of, weights_of
 
 
 def part(predicted, told, kind="runs"):
@@ -24,6 +24,29 @@ def test_of_several_runs_what_is_told_within_a_run_has_no_say():
     blocks = [part(np.column_stack([-told, 0.99 * told]), told, "blocks") for told in z]
     np.testing.assert_allclose(weights_of([*runs, *blocks], 2, True), [1.0, 0.0], atol=0.03)
     np.testing.assert_allclose(weights_of(blocks, 2, True), [0.0, 1.0], atol=0.03)
+
+
+def test_shifts_of_runs_count_as_generalised_least_squares_has_them():
+    """Of the course with s^2 and of the means with s^2 + b^2; runs of one temperature count whole."""
+    rng = np.random.default_rng(2)
+    course, shifts = rng.normal(size=(4, 500)), np.array([5.0, -3.0, 1.0, -2.0])
+    course -= course.mean(axis=1, keepdims=True)
+    told = course + shifts[:, None]
+    plain, better = told * 0.0 + 0.2, 0.9 * course
+    runs = [part(np.column_stack(columns), z) for *columns, z in zip(plain, better, told)]
+    share = shift_share([z - p for z, p in zip(told, better)], list(told))
+    s2, b2 = 0.01 * np.mean(course**2), np.mean(shifts**2)
+    assert share == pytest.approx(np.sqrt(s2 / (s2 + b2)), rel=0.01)
+    for one, before, shift in zip(shifts_apart(runs), runs, shifts):
+        assert one.told.mean() == pytest.approx(share * shift)
+        np.testing.assert_allclose(one.told - one.told.mean(), before.told - before.told.mean(), atol=1e-12)
+    assert weights_of(shifts_apart(runs), 2, True)[1] > 0.9
+    assert not weights_of(runs, 2, True).any()
+    still = [
+        part(np.column_stack((0.5 * z, z)), z + noise)
+        for z, noise in zip(told * 0.0 + shifts[:, None], course)
+    ]
+    assert [one.told.mean() for one in shifts_apart(still)] == pytest.approx(shifts.tolist())
 
 
 def test_what_a_member_adds_to_temperature_must_gain_on_both_of_two_runs():
