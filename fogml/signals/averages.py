@@ -184,18 +184,26 @@ def mean_cosine(before: FloatArray, after: FloatArray) -> FloatArray:
     return np.cos(before + half) * _sine_ratio(half)
 
 
-def covered_share(time: FloatArray, step_s: FloatArray, gap: float = 1.5) -> FloatArray:
+def covered_share(step_s: FloatArray, gap: float = 1.5, over: int = 101) -> FloatArray:
     """Share of the time since the sample before that each sample covers, shape (n,).
 
     Parameters
     ----------
-    time, step_s
-        Time, and time since the sample before [s], shape (n,).
+    step_s
+        Time since the sample before [s], shape (n,).
     gap
         Of the usual step: a longer one is a gap, and the sample after it as long as usual.
+    over
+        The usual step is the median of so many from each on, so that records of other intervals may follow
+        one another; odd.
     """
-    usual = Clock(time).sample_s
-    return np.divide(usual, step_s, out=np.ones(len(time)), where=step_s > gap * max(usual, 1e-300))
+    share = np.ones(len(step_s))
+    if len(step_s) and step_s.max() > gap * step_s[1:].min(initial=step_s.max()):
+        from scipy.ndimage import median_filter
+
+        usual = median_filter(step_s, over, origin=-(over // 2), mode="reflect")
+        np.divide(usual, step_s, out=share, where=step_s > gap * usual)
+    return share
 
 
 def with_whole_turns(turned_deg: FloatArray, told_deg: FloatArray) -> FloatArray:

@@ -254,7 +254,7 @@ class Inputs:
 
     def table_cosine(self, phase_deg: float, harmonic: float = 1.0) -> FloatArray:
         """cos(harmonic * table angle + phase), as the mean over each sample; shape (n,)."""
-        turned = self.turned_deg * covered_share(self.time, self._step_s)
+        turned = self.turned_deg * covered_share(self._step_s)
         moves = turned.any()
         after = np.radians(harmonic * (self.angle_deg if moves else self.angle_deg[:1]) + phase_deg)
         if not moves:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
-from fogml.signals.averages import block_averages, mean_cosine
+from fogml.signals.averages import block_averages, covered_share, mean_cosine
 
 
 def plain(time: np.ndarray, values: np.ndarray, window_s: float) -> tuple[list[float], list[int]]:
@@ -126,3 +126,15 @@ def test_an_angle_that_is_missing_leaves_the_others():
     np.testing.assert_allclose(
         mean_cosine(before, after), (np.sin(after) - np.sin(before)) / (after - before)
     )
+
+
+def test_samples_after_a_gap_cover_their_own_time_in_each_of_records_that_follow_one_another() -> None:
+    step = np.concatenate([[0.0], np.ones(150), 20.0 * np.ones(200)])
+    wanted = np.ones(len(step))
+    for row, times in ((30, 4.0), (31, 7.0), (200, 3.0), (350, 2.0)):
+        step[row] *= times
+        wanted[row] = 1.0 / times
+    assert covered_share(step) == pytest.approx(wanted)
+    # A block of one sample, or of none, tells of no gap.
+    assert covered_share(np.array([5.0])).tolist() == [1.0]
+    assert covered_share(np.empty(0)).tolist() == []

@@ -290,3 +290,21 @@ def test_a_dose_stays_in_the_fibre_from_run_to_run() -> None:
         assert third.columns[name] == pytest.approx(whole.columns[name][1440:], abs=1e-9)
     assert replay_after(twin, third, [first.run, second.run]) == pytest.approx(third.gyro, abs=1e-9)
     assert third.columns["dose"] == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(("before_s", "sample_s"), [(1.0, 20.0), (20.0, 1.0), (5.0, 5.0)])
+def test_what_goes_with_the_tables_angle_is_a_mean_over_each_runs_own_samples(
+    before_s: float, sample_s: float
+) -> None:
+    twin = unit("table_rate_error", "azimuthal_gradient", "fringe_jump").with_effect(
+        "fringe_jump", onset=407.0
+    )
+    turning = ["turn at 4 deg/s for 9 min from second 30"]
+    first = simulate([{"ramp to 40 degC at 1 degC/min": turning}], twin, sample_s=before_s, facts=facts())
+    steps = {"start_temperature": "40 degC", "steps": [{"ramp to 55 degC at 1 degC/min": turning}]}
+    second = simulate(
+        steps, twin, sample_s=sample_s, facts=facts(1.0), after=first, storage=Storage(40.0)
+    ).run
+    found = replay_after(twin, second, [first.run], storage=Storage(40.0))
+    # Rates at the first sample begin with what is known of the storage.
+    assert found[2:] == pytest.approx(second.gyro[2:], abs=2e-3)

@@ -147,7 +147,7 @@ class FringeJump(LoopEffect):
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         time = inputs.time
         step = time - inputs.memory.previous(f"{self.id} time", time)
-        step = step * covered_share(time, step)
+        step = step * covered_share(step)
         beginning = inputs.memory.first(f"{self.id} first time", time)
         since = np.where(np.isinf(inputs.time_on_s), time - beginning, inputs.time_on_s)
         late = since - shape["onset"]
