@@ -297,10 +297,4 @@ def _can_show(declared: Effect, scene: Scene, twin: Twin) -> bool:
         [r.run.columns[name] for r in scene.fit for name in group if name in r.run.columns]
         for group in declared.told_by
     )
-    return all(any(_changes(values) for values in group) for group in told)
-
-
-def _changes(values: FloatArray) -> bool:
-    """Whether a record is not the same throughout, readings that it lacks apart."""
-    held = values[np.isfinite(values)]
-    return len(held) > 0 and float(np.ptp(held)) > 0.0
+    return all(any(float(abs(values - values[0]).max()) > 0.0 for values in group) for group in told)

@@ -91,19 +91,6 @@ def test_a_power_cycle_of_a_unit_that_was_warm_starts_its_warm_up():
         assert not column[since < -3700.0].any()
 
 
-def test_a_supply_that_lacks_a_reading_is_still_one_that_changes():
-    made, twin = _cycle(), load_twin("nominal")
-    supply = 28.0 + (made.time > 7000.0)
-    constant = np.full(len(supply), 28.0)
-    for values, changes in ((supply, True), (constant, False)):
-        for lost in ([], [100, 2000]):
-            column = values.copy()
-            column[lost] = np.nan
-            scene = _scene(Run.derived("a", {**made.columns, "supply": column}, made.facts, "deg/h"))
-            scene = replace(scene, candidates={"supply_ripple": effect("supply_ripple")})
-            assert ("supply_ripple" in {one.id for one in families_of(twin, scene)}) == changes
-
-
 def test_spikes_and_a_limit_of_the_output_are_masked():
     clean = _cycle()
     gyro = clean.gyro.copy()
