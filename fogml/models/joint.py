@@ -153,7 +153,7 @@ class JointModel(DriftModel):
         self.card_ = training_card(
             group, hashes=hashes, rows=row_count(rows), features=self.features_, notes=notes
         )
-        table = interval_table(rows)
+        table = interval_table(rows, lambda part: np.column_stack((self._columns(part), part)))
         self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
         return self
 
@@ -265,13 +265,18 @@ class JointModel(DriftModel):
         return RunRows(np.column_stack((run.gyro, atoms))[used], y[used], run.time[used], notes)
 
     def _out_of_fold(self, fitted: TrainingTable, held: TrainingTable) -> FloatArray:
-        """Rate at rows of output and atoms, of the model fitted to others and limited to their box."""
-        features = copy(self.features_)
-        learn_box(features, [fitted.X[:, 1:]])
-        full = np.ones(len(held), dtype=np.bool_)
-        limited, _ = features.limit(held.X[:, 1:], full, linear=True)
-        regressor = self.regressor_.refitted(self._columns(fitted.X), fitted.y)
-        return regressor.predict(self._columns(np.column_stack((held.X[:, 0], limited))))
+        """Rate at averages of columns, and of output and atoms, of the model fitted to others.
+
+        Averages of products, as the output turns while the temperature moves; what limiting atoms to the
+        others' box changes is that of averages.
+        """
+        features, width = copy(self.features_), self.regressor_.n_features_in_
+        learn_box(features, [fitted.X[:, width + 1 :]])
+        full, held_rows = np.ones(len(held), dtype=np.bool_), held.X[:, width:]
+        limited, _ = features.limit(held_rows[:, 1:], full, linear=True)
+        regressor = self.regressor_.refitted(fitted.X[:, :width], fitted.y)
+        moved = self._columns(np.column_stack((held_rows[:, 0], limited))) - self._columns(held_rows)
+        return regressor.predict(held.X[:, :width] + moved)
 
     def _part(self, rows: RunRows) -> Part:
         return Part(rows.y, lambda piece: self._columns(rows.atoms[piece]), dealt_folds(len(rows.y)))

@@ -221,7 +221,7 @@ class TimelineBlock:
         Left to the chamber it gives the cold that the set point asks for: rate / fastest rate
         plus (T - room) / 100 degC where that is negative.
         """
-        return self._given_or("compressor", np.clip(-self._demand, 0.0, 1.0))
+        return self._given_or("compressor", np.clip(0.0 - self._demand, 0.0, 1.0))
 
     @cached_property
     def heater(self) -> FloatArray:

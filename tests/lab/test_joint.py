@@ -105,3 +105,18 @@ def test_window_of_the_joint_rate_is_kept(tmp_path):
     np.testing.assert_array_equal(again.predict(run), model.predict(run))
     with pytest.raises(InputError, match="must be positive"):
         JointModel(rate_window_s=0.0).fit(run)
+
+
+def test_the_interval_of_a_run_that_turns_as_it_warms_is_of_what_is_left() -> None:
+    """Turns of 50 deg/s either way while T moves by 3 degC a minute: averages of both make none of T D."""
+    rng, time = np.random.default_rng(2), np.arange(0.0, 24_000.0, 2.0)
+    temperature = 30.0 * np.sin(2.0 * np.pi * time / 4_000.0)
+    rate = 50.0 * np.array([0.0, 1.0, -1.0])[(time // 60.0).astype(int) % 3]
+    scale, white = 1.0 + 8e-6 * temperature, 0.2 * rng.standard_normal(len(time))
+    columns = {"time": time, "gyro": 3600.0 * rate * scale + 0.02 * temperature + white, "T": temperature}
+    run = Run("warming", {**columns, "rate": rate}, Facts())
+    model = JointModel().fit(run)
+    left = model.compensate(run).compensated - 3600.0 * rate
+    averages = np.abs(left.reshape(-1, 50).mean(axis=1))
+    half = model.intervals_.half_width(0.9)
+    assert np.mean(averages <= half) > 0.85 and half < 3.0 * np.quantile(averages, 0.9)
