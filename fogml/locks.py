@@ -9,6 +9,7 @@ import re
 import socket
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,8 @@ def _locked(handle: int, wait: bool) -> bool:
     return True
 
 
+_LONGEST_NAME = 240
+"""Bytes of a lock's name: file systems hold 255, its dot and suffix among them."""
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """Errors of a disk that takes no more."""
 
@@ -122,6 +125,8 @@ def sole_writer(path: str | Path) -> Iterator[None]:
     real = Path(os.path.realpath(path))
     home = real if real.is_dir() and has_to_stay(real) else nearest_folder(real.parent)
     name = "+".join(real.relative_to(home).parts)
+    if len(os.fsencode(name)) > _LONGEST_NAME:
+        name = sha256(os.fsencode(name)).hexdigest()
     lock = FileLock(home / f".{name}.lock")
     try:
         free = lock.acquire(wait=False)

@@ -420,3 +420,15 @@ def test_what_no_file_can_be_put_in_place_of_is_refused(tmp_path):
     with pytest.raises(InputError, match="links to one file"), whole_files(*both):
         pass
     assert (tmp_path / "pipe").is_fifo() and (tmp_path / "link").is_symlink()
+
+
+@pytest.mark.parametrize("parts", [("a" * 250,), ("b" * 60,) * 5, ("c",)])
+def test_an_output_may_have_as_long_a_name_as_the_system_takes(tmp_path, parts):
+    """One writer at a time all the same: a second is refused, and no lock stays."""
+    out = tmp_path.joinpath(*parts)
+    with whole_folder(out) as folder:
+        (folder / "x").write_text("1")
+        with pytest.raises(InputError, match="is writing it"), whole_folder(out):
+            pass
+    assert (out / "x").read_text() == "1"
+    assert [entry.name for entry in tmp_path.iterdir()] == [parts[0]]
