@@ -110,21 +110,26 @@ def advice_on(judgement: Judgement, asked: Asked | None = None) -> Advice:
 def which_to_use(judgement: Judgement, asked: Asked | None = None) -> tuple[str | None, str]:
     """The model judged beside that is the better one, None if there is none, and that in a sentence.
 
-    By the worst test run of each, on the same rows.
+    By the worst test run of each, on the same rows: by its rms; where that is alike, as where the run's mean
+    moved by more than models differ, by its bias stability.
     """
-    margin = (asked or Asked()).beside
-    own = max(run.after.rms for run in judgement.test)
-    left = {name: max(run.after.rms for run in runs) for name, runs in judgement.beside.items()}
-    if not left:
-        return None, ""
-    best = min(left, key=lambda name: left[name])
-    kind = judgement.model["kind"]
-    told = f"{best} leaves {short(left[best])} deg/h rms on its worst test run, {kind} {short(own)}"
-    if left[best] < (1.0 - margin) * own:
-        return best, f"Use {best}: {told}."
-    if own < (1.0 - margin) * left[best]:
-        return None, f"Use this model rather than {best}: {told}."
-    return None, f"Use either: {told}, which is no difference that another run would be sure to repeat."
+    margin, kind = (asked or Asked()).beside, judgement.model["kind"]
+    either = ""
+    for figure, unit in (("rms", "deg/h rms"), ("bias_stability", "deg/h of bias stability")):
+        own = max(getattr(run.after, figure) for run in judgement.test)
+        left = {name: max(getattr(r.after, figure) for r in runs) for name, runs in judgement.beside.items()}
+        if not left:
+            return None, ""
+        best = min(left, key=lambda name: left[name])
+        told = f"{best} leaves {short(left[best])} {unit} on its worst test run, {kind} {short(own)}"
+        if left[best] < (1.0 - margin) * own:
+            return best, f"Use {best}: {told}."
+        if own < (1.0 - margin) * left[best]:
+            return None, f"Use this model rather than {best}: {told}."
+        either = (
+            either or f"Use either: {told}, which is no difference that another run would be sure to repeat."
+        )
+    return None, either
 
 
 def output_reasons(judgement: Judgement, asked: Asked | None = None) -> Iterator[Reason]:

@@ -146,6 +146,21 @@ def test_of_two_models_the_one_that_leaves_less_is_named() -> None:
     assert which_to_use(judgement()) == (None, "")
 
 
+def test_where_the_mean_of_the_run_moved_the_steadier_model_is_named() -> None:
+    """A shift of 3 deg/h beside 0.03 or 0.1 deg/h about the mean: hypot(3, 0.1) is 3.0017."""
+    base = replace(judgement(), design_index=None, limits=())
+    (run,) = base.test
+
+    def leaving(stability: float) -> RunJudgement:
+        rms = float(np.hypot(3.0, stability))
+        return replace(run, after=replace(run.after, bias=3.0, bias_stability=stability, rms=rms))
+
+    for own, other, better, told in ((0.1, 0.03, "auto", "Use auto"), (0.03, 0.1, None, "Use this model")):
+        judged = replace(base, test=(leaving(own),), beside={"auto": (leaving(other),)})
+        name, sentence = which_to_use(judged)
+        assert name == better and sentence.startswith(told) and "bias stability" in sentence
+
+
 @pytest.mark.parametrize(
     ("drift", "left", "grade", "brief"),
     [
