@@ -28,7 +28,7 @@ from fogml.validation.run_errors import RunErrors, run_errors, training_means
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
 
-_NOISE = "_validation_noise"
+_NOISE, _SHARED = "_validation_noise", "_validation_shared"
 
 
 def judge(
@@ -164,8 +164,11 @@ def _within(errors: RunErrors, models: Sequence[DriftModel]) -> RunErrors:
 
 def _seen(run: Run, train: Sequence[Run]) -> tuple[Finding, ...]:
     """Whether a test run holds samples of a training run, on whatever clock."""
+    known: dict[str, float] = run.__dict__.setdefault(_SHARED, {})  # models are judged on the same runs
     for other in train:
-        if share := shared_samples(run.gyro, other.gyro):
+        if other.hash not in known:
+            known[other.hash] = shared_samples(run.gyro, other.gyro)
+        if share := known[other.hash]:
             what = "the same samples as" if share == 1.0 else f"samples of (about {percent(share, 0)})"
             message = (
                 f"holds {what} training run {other.name}: its figures say how well the model was fitted, "
