@@ -6,9 +6,10 @@ import csv
 import io
 import re
 import zipfile
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, datetime, time, timedelta
 from functools import partial
-from itertools import chain, repeat
+from itertools import chain, pairwise, repeat
 from typing import Any
 
 import numpy as np
@@ -99,6 +100,18 @@ def _seconds_since(first: np.datetime64, moments: Any) -> Any:
     return (moments - first) / np.timedelta64(1, "s")
 
 
+def _with_midnights(rows: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
+    """Rows whose dates are midnights where the cell above or below is a date with a time of day."""
+    above: list[Any] = []
+    for row, below in pairwise(chain(map(list, rows), [[]])):
+        for place, value in enumerate(row):
+            beside = (other[place] for other in (above, below) if place < len(other))
+            if type(value) is date and any(isinstance(other, datetime) for other in beside):
+                row[place] = datetime.combine(value, time())
+        yield row
+        above = row
+
+
 class Sheet:
     """A worksheet as the text of a CSV file."""
 
@@ -110,7 +123,7 @@ class Sheet:
         self.is_empty = True
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        for row in rows:
+        for row in _with_midnights(rows):
             writer.writerow([_cell(value) for value in row])
             if text.tell() > BLOCK_BYTES:
                 self.flush(text)

@@ -343,3 +343,17 @@ def test_what_a_profile_by_hand_meets_in_a_workbook_is_told_by_row_and_value(
     (tmp_path / "own.yaml").write_text(STAMPED.replace("unit: stamp", f"unit: {unit}"))
     with pytest.raises(InputError, match=rf"^book\.xlsx, .*{told}"):
         import_recording(tmp_path / "book.xlsx", load_profile(str(tmp_path / "own.yaml")))
+
+
+@pytest.mark.parametrize("first", [0, -3], ids=["at the begin", "within"])
+def test_a_date_with_time_at_midnight_is_no_bare_date(tmp_path, first):
+    import datetime
+
+    book = openpyxl.Workbook()
+    book.active.append(["Date/Time", "Gyro (deg/h)"])
+    for row in range(12):
+        moment = datetime.datetime(2026, 3, 3) + datetime.timedelta(seconds=first + row)
+        book.active.append([moment, 9.0 + 0.1 * (row % 3)])
+    book.save(tmp_path / "night.xlsx")
+    run = read_run(tmp_path / "night.xlsx")
+    np.testing.assert_allclose(run.time - run.time[0], np.arange(12.0), atol=1e-6)
