@@ -69,7 +69,8 @@ def subset(folder: Path, quick: bool) -> dict[str, Any]:
     from fogml.blind.folders import BlindFolder, case_files
     from fogml.blind.make import make_cases
     from fogml.blind.methods import load_method
-    from fogml.blind.score import score
+    from fogml.blind.score import gather
+    from fogml.blind.scoring.values import score_values
 
     count = 1 if quick else CASES
     make_cases(folder, count, CASE_SEED, workers=1, kinds=["one"])
@@ -95,7 +96,7 @@ def subset(folder: Path, quick: bool) -> dict[str, Any]:
                 failures[name].append(reason)
             else:
                 spent[name].append(seconds)
-    values = score(blind, list(methods))
+    values = score_values(gather(blind, list(methods)))
     rows = []
     for name in methods:
         figures = {row["key"]: row["value"] for row in values["methods"][name]["rows"]}

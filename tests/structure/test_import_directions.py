@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 from functools import cache
 from graphlib import TopologicalSorter
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -94,3 +96,22 @@ def test_temporary_files_with_a_name_go_even_where_their_process_is_killed() -> 
     others = {"outputs.py", "app/handlers.py", "testing/models.py"}
     sources = {str(path.relative_to(ROOT)): path.read_text() for path in ROOT.rglob("*.py")}
     assert {name for name, text in sources.items() if named.search(text)} <= others
+
+
+def test_every_name_that_the_experiments_take_from_the_package_is_there():
+    """Also within functions, which no import of theirs meets."""
+    lacking = []
+    for path in sorted((ROOT.parent / "experiments").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or (node.module or "").partition(".")[0] != "fogml":
+                continue
+            module = importlib.import_module(node.module)
+            for name in (alias.name for alias in node.names):
+                held = (
+                    hasattr(module, name)
+                    or hasattr(module, "__path__")
+                    and find_spec(f"{node.module}.{name}")
+                )
+                if not held:
+                    lacking.append(f"{path.name}, line {node.lineno}: {node.module}.{name}")
+    assert lacking == []
