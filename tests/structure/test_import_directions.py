@@ -107,11 +107,7 @@ def test_every_name_that_the_experiments_take_from_the_package_is_there():
                 continue
             module = importlib.import_module(node.module)
             for name in (alias.name for alias in node.names):
-                held = (
-                    hasattr(module, name)
-                    or hasattr(module, "__path__")
-                    and find_spec(f"{node.module}.{name}")
-                )
-                if not held:
+                inside = hasattr(module, "__path__") and find_spec(f"{node.module}.{name}")
+                if not (hasattr(module, name) or inside):
                     lacking.append(f"{path.name}, line {node.lineno}: {node.module}.{name}")
     assert lacking == []
