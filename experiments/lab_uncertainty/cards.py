@@ -15,7 +15,7 @@ from fogml.gap.field import Field
 from fogml.gap.inference import foreseen
 from fogml.gap.model import TwinModel
 from fogml.gap.settings import STANDARD
-from fogml.gap.shapes import is_angle, is_line, is_whole
+from fogml.gap.shapes import is_line, is_whole
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect, NoiseEffect
@@ -93,7 +93,7 @@ def _told(declared: Effect, field: Field, repeats: int, seed: int) -> Iterator[t
     for repeat in range(repeats):
         rng = np.random.default_rng([seed, repeat, *declared.id.encode()])
         shape = {
-            q.name: float(rng.uniform(0.0, 360.0)) if is_angle(q) else q.draw(rng, scene.grade)
+            q.name: float(rng.uniform(0.0, 360.0)) if q.all_round else q.draw(rng, scene.grade)
             for q in declared.shape
         }
         shape |= {q.name: float(round(shape[q.name])) for q in declared.shape if is_whole(q, scene.grids)}
@@ -114,11 +114,11 @@ def _told(declared: Effect, field: Field, repeats: int, seed: int) -> Iterator[t
         }
         card = card_of(declared.id, field, replace(field.base, data=made + noise), lines)
         # (A, phi) and (-A, phi + 180 deg) are one where all turns.
-        turned = any(is_angle(q) for q in declared.shape) and sign * card.value.amplitude < 0.0
+        turned = any(q.all_round for q in declared.shape) and sign * card.value.amplitude < 0.0
         errors = []
         for quantity in declared.shape:
             off = card.value.shape[quantity.name] - shape[quantity.name]
-            if is_angle(quantity):
+            if quantity.all_round:
                 off = (off + 180.0 * turned + 180.0) % 360.0 - 180.0
             if not is_whole(quantity, scene.grids):
                 errors.append(of_errors(off, card.shape_se[quantity.name]))

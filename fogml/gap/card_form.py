@@ -13,7 +13,7 @@ from fogml.gap.catalogue import driving_of
 from fogml.gap.field import Field
 from fogml.gap.linear_gaussian import LinearGaussian
 from fogml.gap.rows import at_amplitude
-from fogml.gap.shapes import AT_AMPLITUDE, is_angle, is_whole
+from fogml.gap.shapes import AT_AMPLITUDE, is_whole
 from fogml.intervals import Z90
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Grade, Quantity
@@ -31,7 +31,7 @@ class _Unknown:
     @property
     def free(self) -> bool:
         """Whether its prior leaves room."""
-        return is_angle(self.quantity) or self._law[1] > 0.0
+        return self.quantity.all_round or self._law[1] > 0.0
 
     @property
     def _law(self) -> tuple[float, float, bool]:
@@ -43,17 +43,17 @@ class _Unknown:
     @property
     def weight(self) -> float:
         """Of the prior: no angle is likelier than others."""
-        return 0.0 if is_angle(self.quantity) else 1.0
+        return 0.0 if self.quantity.all_round else 1.0
 
     @property
     def limits(self) -> tuple[float, float]:
         """Where the unknown can be."""
         low, high = self.quantity.limits
-        return (-math.inf, math.inf) if is_angle(self.quantity) else (self.unknown(low), self.unknown(high))
+        return (-math.inf, math.inf) if self.quantity.all_round else (self.unknown(low), self.unknown(high))
 
     def unknown(self, value: float) -> float:
         """What stands for a value."""
-        if is_angle(self.quantity):
+        if self.quantity.all_round:
             return math.radians(value)
         middle, spread, log = self._law
         if log:
@@ -62,7 +62,7 @@ class _Unknown:
 
     def value(self, unknown: float) -> float:
         """What an unknown stands for."""
-        if is_angle(self.quantity):
+        if self.quantity.all_round:
             return math.degrees(unknown) % 360.0
         middle, spread, log = self._law
         value = middle + spread * unknown
@@ -70,7 +70,7 @@ class _Unknown:
 
     def scale(self, unknown: float) -> float:
         """How far the value moves with the unknown, in the value's unit."""
-        if is_angle(self.quantity):
+        if self.quantity.all_round:
             return math.degrees(1.0)
         _, spread, log = self._law
         return spread * (self.value(unknown) if log else 1.0)
@@ -157,7 +157,7 @@ class Form:
         shape_se = dict.fromkeys(shape, 0.0)
         amplitude_se, *others = (errors * self.scales(unknowns)).tolist()
         for u, error in zip(self.free, others):
-            shape_se[u.quantity.name] = min(error, 180.0) if is_angle(u.quantity) else error
+            shape_se[u.quantity.name] = min(error, 180.0) if u.quantity.all_round else error
         return Fitted(self.usual * float(unknowns[0]), amplitude_se, shape, shape_se)
 
     def scales(self, unknowns: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from fogml.gap.linear_gaussian import LinearGaussian
 from fogml.gap.model import EffectValue
 from fogml.gap.posterior import Cause, Judgement
 from fogml.gap.rows import Rows
-from fogml.gap.shapes import GridNode, is_angle, is_line
+from fogml.gap.shapes import GridNode, is_line
 from fogml.runs.steps import FINEST_STEP_DEGC, WHOLE, recorded_step
 from fogml.twin.effect import Effect
 from fogml.twin.twin import EffectSetting
@@ -110,7 +110,7 @@ def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, An
     declared = scene.candidates[id]
     if _spreads(declared):
         return _drawn(declared, told, field, beside)
-    angles = [q.name for q in declared.shape if is_angle(q)]
+    angles = [q.name for q in declared.shape if q.all_round]
     optima: list[Optimum] = []
     root = Root(beside)
     for place, amplitude, shape in _starts(declared, field, beside, told):
@@ -154,7 +154,7 @@ def _starts(declared: Effect, field: Field, beside: LinearGaussian, told: Mappin
     by_run = [list(islice(build(r, scene, setting.values), reported.card_nodes)) for r in scene.fit]
     stacked = field.whitening.stacked([np.concatenate([b.columns for b in own], axis=1) for own in by_run])
     least = max(map(abs, declared.amplitude.limits)) ** -2.0
-    angles = [q.name for q in declared.shape if is_angle(q)]
+    angles = [q.name for q in declared.shape if q.all_round]
     _, usual = declared.amplitude.range(scene.grade)
     tried: list[tuple[float, Start]] = []
     at = 0

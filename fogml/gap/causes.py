@@ -56,8 +56,8 @@ def _by_run(found: Inference, every: Foretold, cause: Cause, amplitude: float) -
     """Amplitude that each run asks for beside all else, which is anew in each; the form as found."""
     held = found.field
     rest = held.design(m for m in every.members if m not in cause.members)
-    own = [at for m, at in zip(every.members, held.places(every.members)) if m in cause.members]
-    course = np.sum([held.design(every.members)[:, at] @ every.posterior.mean[at] for at in own], axis=0)
+    courses = zip(every.members, held.courses(every.members, every.posterior.mean))
+    course = np.sum([values for m, values in courses if m in cause.members], axis=0)
     rows = []
     for r, span in zip(found.scene.fit, found.setting.spans):
         alone = LinearGaussian.of(held.base.data[span]).beside(rest[span])

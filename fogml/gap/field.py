@@ -139,6 +139,11 @@ class Field:
         widths = (self.at[m.node].stop - self.at[m.node].start for m in members)
         return [slice(a, b) for a, b in pairwise(accumulate(widths, initial=self.fixed.shape[1]))]
 
+    def courses(self, members: Sequence[Member], coefficients: FloatArray) -> list[FloatArray]:
+        """What each member makes at coefficients of `design`, whitened, shape (n,)."""
+        told = zip(members, self.places(members))
+        return [m.size * self.block(m.node) @ coefficients[at] for m, at in told]
+
     def beside(self, members: Iterable[Member]) -> LinearGaussian:
         """The data beside the fixed block and members with their sizes."""
         held = self.base

@@ -163,8 +163,7 @@ def _energies(found: Inference, explanation: Explanation) -> dict[int, float]:
     held = found.field
     mean = Posterior.of(held.design(explanation.members), held.base.data).mean
     made: dict[int, float] = {}
-    for m, at in zip(explanation.members, held.places(explanation.members)):
-        course = m.size * held.block(m.node) @ mean[at]
+    for m, course in zip(explanation.members, held.courses(explanation.members, mean)):
         if found.kind(m) != "plant":
             left = float(held.base.gram(course[:, None])[0, 0])
             made[m.family] = made.get(m.family, 0.0) + max(left, 0.0)

@@ -222,7 +222,7 @@ def _grid(
     if not candidate.shape:
         return (GridNode({}, ({},)),)
     usual = candidate.default_shape(grade)
-    turning = [q for q in candidate.shape if is_angle(q)]
+    turning = [q for q in candidate.shape if q.all_round]
     rest = [q for q in candidate.shape if q not in turning]
     linear = [q for q in rest if not is_line(q) and _in_proportion(q, grade, response, usual)]
     bent = [q for q in rest if q not in linear]
@@ -237,11 +237,6 @@ def _grid(
         turns = math.prod(map(len, directions.values()))
         nodes.append(GridNode(shape, draws, turns))
     return tuple(nodes)
-
-
-def is_angle(quantity: Quantity) -> bool:
-    """Whether a shape parameter is a direction all round."""
-    return quantity.all_round
 
 
 def is_line(quantity: Quantity) -> bool:

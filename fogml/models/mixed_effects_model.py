@@ -78,10 +78,8 @@ class MixedEffectsModel(FeatureModel):
 
     def _chosen_features(self, runs: Sequence[Run]) -> Features:
         temperatures = [run.temperature("T") for run in runs]
-        self._both_ways, self._courses_tell = (
-            moves_both_ways(temperatures),
-            each_moves_both_ways(temperatures),
-        )
+        self._both_ways = moves_both_ways(temperatures)
+        self._courses_tell = each_moves_both_ways(temperatures)
         return offered(runs) if self.features is None else resolve_features(self.features, runs)
 
     def _fit_rows(self, rows: Sequence[RunRows], features: Features) -> int:

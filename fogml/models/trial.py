@@ -71,6 +71,7 @@ class Trial:
         self.both_directions = moves_both_ways(temperatures)
         self.direction_told = direction_is_told(temperatures)
         self._courses_tell = each_moves_both_ways(temperatures)
+        self._known: dict[tuple[Candidate, int], tuple[FloatArray, int]] = {}
         self.candidates = (
             candidates_of(features)
             if features
@@ -109,18 +110,20 @@ class Trial:
         """
         table = self._table
         squares, rows = [], []
-        for folds in self._partings:
-            predicted, parameters = self._predicted(candidate, folds)
+        for parting in range(len(self._partings)):
+            predicted, parameters = self._predicted(candidate, parting)
             by_block = squares_by_block(table, self._apart(table.y - predicted))
             squares.append(by_block[0])
             rows.append(by_block[1])
         of_runs = len(rows[0]) if self.several_runs else None
         return Score(candidate, parameters, np.concatenate(squares), np.concatenate(rows), of_runs)
 
-    def _predicted(self, candidate: Candidate, folds: Sequence[Fold]) -> tuple[FloatArray, int]:
+    def _predicted(self, candidate: Candidate, parting: int) -> tuple[FloatArray, int]:
         """What a candidate foretells of each row while its fold is held out, and its number of parameters."""
+        if (candidate, parting) in self._known:
+            return self._known[candidate, parting]
         predicted, parameters = np.empty(len(self._table)), 1
-        for fitted, held in folds:
+        for fitted, held in self._partings[parting]:
             if not candidate.features:
                 predicted[held] = self._table.y[fitted].mean()
                 continue
@@ -129,6 +132,7 @@ class Trial:
             predicted[held], parameters = held_out_prediction(
                 regressor_for(candidate, self.seed), features, atoms, self._table, fitted, held
             )[:2]
+        self._known[candidate, parting] = predicted, parameters
         return predicted, parameters
 
     def _apart(self, errors: FloatArray) -> FloatArray:
@@ -143,7 +147,7 @@ class Trial:
         if not (self.several_runs and self._courses_tell):
             return 1.0
         folds, told = self._partings[0], self._table.y
-        left = told - self._predicted(self.candidates[0], folds)[0]
+        left = told - self._predicted(self.candidates[0], 0)[0]
         return shift_share([left[held] for _, held in folds], [told[held] for _, held in folds])
 
     def chosen(self, scores: Sequence[Score]) -> Score:
