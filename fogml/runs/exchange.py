@@ -12,6 +12,7 @@ from fogml.numerals import short
 from fogml.pictures import BEFORE, OTHERS, Panel, Pictured, in_time
 from fogml.runs.columns import conversion, header, is_temperature, parse_header
 from fogml.runs.facts import Facts
+from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.possible import as_vector
 
 if TYPE_CHECKING:
@@ -28,14 +29,15 @@ class Exchange(Pictured):
 
     @classmethod
     def from_pandas(cls, frame: pd.DataFrame, name: str = "run", facts: Facts | None = None) -> Self:
-        """A run from a frame, a column each.
+        """A run from a frame, a column each; what becomes of the frame later does not change it.
 
         Parameters
         ----------
         frame
             Columns called as in a run's file, ``gyro`` or ``gyro [deg/s]``; without a unit they are in the
-            run format's. An index of times, not one that counts rows, becomes ``time`` where there is no
-            such column.
+            run format's. Where there is no column ``time`` the index is it, if it holds dates, durations or
+            fractional numbers [s], or is called so, ``time [ms]`` say. Of dates the first is the fact
+            ``started``, unless that is stated.
         name
             Name of the run.
         facts
@@ -47,29 +49,26 @@ class Exchange(Pictured):
             If a column is named twice, or in a unit that the run format does not take, its values are no
             numbers, or there are no times.
         """
+        cells = canonical_cells([str(cell) for cell in frame.columns])
+        held = [(*parse_header(cell), frame.iloc[:, place]) for place, cell in enumerate(cells)]
+        if "time" not in [column for column, _, _ in held]:
+            held.insert(0, _times_of_index(frame.index, name))
         columns: dict[str, Any] = {}
-        unit_of_gyro = "deg/h"
-        for position, cell in enumerate(map(str, frame.columns)):
-            column, unit = parse_header(cell)
-            values = frame.iloc[:, position].to_numpy()
+        facts = facts or Facts()
+        for column, unit, series in held:
             if column in columns:
                 raise InputError(f"{name}: column '{column}' is there twice")
             factor, offset = (1.0, 0.0) if unit is None else conversion(column, unit, name)
-            if (factor, offset) != (1.0, 0.0):
-                values = as_vector(name, column, values) * factor + offset
-            if column == "gyro" and unit == "count":
-                unit_of_gyro = "count"
+            # Of dates with a time zone pandas makes objects unless it is asked for dates.
+            kind = np.dtype("M8[ns]") if series.dtype.kind == "M" else None
+            values = as_vector(name, column, series.to_numpy(kind))
+            if (factor, offset) != (1.0, 0.0) and series.dtype.kind not in "mM":  # these tell their unit
+                values = values * factor + offset
+            if column == "time" and facts.started is None and series.dtype.kind == "M" and len(series):
+                facts = facts.model_copy(update={"started": series[:1].to_list()[0].to_pydatetime()})
             columns[column] = values
-        if "time" not in columns:
-            if type(frame.index).__name__ == "RangeIndex":
-                raise InputError(
-                    f"{name}: no column 'time', and the index counts rows; add the times in seconds as a "
-                    "column 'time' or as the index"
-                )
-            index = frame.index.to_numpy()
-            seconds = index / np.timedelta64(1, "s") if index.dtype.kind == "m" else index
-            columns = {"time": seconds, **columns}
-        return cls(name, columns, facts or Facts(), unit_of_gyro)  # type: ignore[call-arg]
+        is_count = ("gyro", "count") in [(column, unit) for column, unit, _ in held]
+        return cls(name, columns, facts, "count" if is_count else "deg/h")  # type: ignore[call-arg]
 
     def to_pandas(self) -> pd.DataFrame:
         """The columns as a frame, in internal units that the names state: ``gyro [deg/h]``."""
@@ -110,3 +109,17 @@ class Exchange(Pictured):
             curves = [in_time(time, self.columns[n], n, c) for n, c in zip(warm, colours, strict=False)]
             panels.append(Panel(curves, "time [h]", "temperature [°C]"))
         return panels
+
+
+def _times_of_index(index: pd.Index[Any], name: str) -> tuple[str, str | None, Any]:
+    """Column, unit and values of the times that an index holds; refused where it may count rows instead."""
+    cell = "time" if index.name is None else canonical_cells([str(index.name)])[0]
+    column, unit = parse_header(cell)
+    if index.dtype.kind in "mM":
+        return "time", unit if column == "time" else None, index
+    if column != "time" or (index.name is None and index.dtype.kind != "f"):
+        raise InputError(
+            f"{name}: no column 'time', and the index is not called so: it may count rows; add the times in "
+            "seconds as a column 'time', or call the index 'time [s]'"
+        )
+    return column, unit, index

@@ -30,7 +30,7 @@ from fogml.signals.clock import Clock, gap_starts
 class Run(Exchange):
     """One recording: columns of float64 in internal units, in time order, and facts.
 
-    Columns are read-only; slices and stretches are views on the same memory.
+    Columns are read-only copies of what is given; slices and stretches are views on the same memory.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Run(Exchange):
             Naming the run, the column and the first sample at fault: no vector of numbers, of another
             length, missing or infinite, time that goes back or repeats, or is in too coarse a precision.
         """
-        columns = {name: as_vector(self.name, name, values) for name, values in self.columns.items()}
+        columns = {name: as_vector(self.name, name, values).copy() for name, values in self.columns.items()}
         self._freeze(columns)
         check_columns(self.name, columns)
         time, finding = sampling_times(columns)
@@ -107,7 +107,7 @@ class Run(Exchange):
     @classmethod
     def from_columns(cls, name: str = "run", facts: Facts | None = None, **columns: ArrayLike) -> Run:
         """A run from arrays in internal units: ``Run.from_columns(time=t, gyro=g, T=temperature)``."""
-        return cls(name, {k: as_vector(name, k, x).copy() for k, x in columns.items()}, facts or Facts())
+        return cls(name, columns, facts or Facts())  # type: ignore[arg-type]
 
     def __len__(self) -> int:
         return len(self.columns["time"])
@@ -309,7 +309,7 @@ class Run(Exchange):
 
     def with_columns(self, **columns: ArrayLike) -> Run:
         """The run with columns added or replaced (internal units)."""
-        added = {name: as_vector(self.name, name, values) for name, values in columns.items()}
+        added = {name: as_vector(self.name, name, values).copy() for name, values in columns.items()}
         check_columns(self.name, added)
         return self._with({**self.columns, **added})
 

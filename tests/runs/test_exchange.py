@@ -41,21 +41,73 @@ def test_units_of_a_frame_are_converted() -> None:
     assert Run.from_pandas(pd.DataFrame({"time": [0, 1], "gyro [count]": [5, 6]})).gyro_unit == "count"
 
 
+SUMMER_ENDS = pd.date_range("2026-10-24 22:00", periods=400, freq="1min", tz="UTC")
+
+
 @pytest.mark.parametrize(
-    "index", [pd.date_range("2026-01-01", periods=3, freq="500ms"), pd.to_timedelta([0, 0.5, 1], "s")]
+    ("index", "last_s"),
+    [
+        (pd.date_range("2026-01-01", periods=400, freq="500ms", unit="ms"), 199.5),
+        (SUMMER_ENDS.tz_convert("Europe/Berlin"), 399 * 60.0),
+        (pd.timedelta_range(0, periods=400, freq="500ms"), 199.5),
+        (pd.Index(0.5 * np.arange(400)), 199.5),
+        (pd.Index(500 * np.arange(400), name="time [ms]"), 199.5),
+        (pd.Index(500.0 * np.arange(400), name="time [ms]"), 199.5),
+        (pd.RangeIndex(400, name="Time (min)"), 399 * 60.0),
+        (pd.date_range("2026-01-01", periods=400, freq="500ms", name="time [ms]"), 199.5),
+    ],
 )
-def test_an_index_of_times_is_the_time(index: pd.Index) -> None:
-    made = Run.from_pandas(pd.DataFrame({"gyro": [1.0, 2.0, 3.0]}, index=index))
-    np.testing.assert_allclose(made.time, [0.0, 0.5, 1.0])
+def test_an_index_of_times_is_the_time_as_a_column_of_them_is(index: pd.Index, last_s: float) -> None:
+    frame = pd.DataFrame({"gyro": np.sin(np.arange(400.0))}, index=index)
+    made = Run.from_pandas(frame)
+    assert made.time[-1] - made.time[0] == pytest.approx(last_s, rel=1e-12)
+    again = Run.from_pandas(frame.reset_index(names=index.name or "time"))
+    assert again.hash == made.hash and again.facts == made.facts
+    assert made.facts.started == (index[0] if isinstance(index, pd.DatetimeIndex) else None)
+
+
+def test_an_index_that_may_count_rows_is_no_clock() -> None:
+    whole = pd.DataFrame({"gyro": np.arange(9.0), "T": 20.0})
+    for frame in (whole, whole[whole.gyro != 3.0], whole.set_index("T")):
+        with pytest.raises(InputError, match="call the index 'time \\[s\\]'"):
+            Run.from_pandas(frame)
+
+
+def test_a_frame_is_called_as_a_file_is() -> None:
+    frame = pd.DataFrame({"Time (ms)": [0, 500], "gyro_dps": [1.0, 2.0], "Rate (deg/h)": [3600.0, 7200.0]})
+    made = Run.from_pandas(frame)
+    np.testing.assert_allclose(made.reference_deg_h, [3600.0, 7200.0])
+    np.testing.assert_allclose(made.error_deg_h, 0.0, atol=1e-9)
+    np.testing.assert_allclose(made.time, [0.0, 0.5])
+
+
+def test_a_run_keeps_what_it_was_given() -> None:
+    values = np.sin(TIME)
+    frame = pd.DataFrame({"time": TIME, "gyro": values})
+    shown = values.view()
+    shown.flags.writeable = False
+    made = [
+        Run.from_pandas(frame),
+        Run("a", {"time": TIME, "gyro": shown}),
+        Run("a", {"time": TIME, "gyro": 0.0 * TIME}).with_columns(gyro=values),
+    ]
+    frame.iloc[1, 1] = values[1] = 99.0
+    assert [float(run.gyro[1]) for run in made] == [np.sin(1.0)] * 3
 
 
 @pytest.mark.parametrize(
     ("columns", "told"),
     [
-        ({"gyro [furlong]": [1.0, 2.0]}, "column 'gyro' has unit 'furlong', not accepted"),
-        ({"gyro": [1.0, 2.0], "gyro [deg/s]": [1.0, 2.0]}, "column 'gyro' is there twice"),
+        (
+            {"time": [0.0, 1.0], "gyro [furlong]": [1.0, 2.0]},
+            "column 'gyro' has unit 'furlong', not accepted",
+        ),
+        (
+            {"time": [0.0, 1.0], "gyro": [1.0, 2.0], "gyro [deg/s]": [1.0, 2.0]},
+            "column 'gyro' is there twice",
+        ),
         ({"time": [0.0, 1.0], "T": [1.0, 2.0]}, "no column 'gyro'"),
-        ({"gyro": [1.0, 2.0]}, "no column 'time', and the index counts rows"),
+        ({"gyro": [1.0, 2.0]}, "no column 'time', and the index .* may count rows"),
         ({"time": [0.0, 1.0], "gyro": ["a", "b"]}, "gyro"),
         ({"time": [0.0, 0.0], "gyro": [1.0, 2.0]}, "time"),
     ],
