@@ -172,26 +172,16 @@ def _ratios(values: Mapping[str, Any]) -> Drawing:
         x = [values["drift"][name]["figures"][group]["ratio"]["value"] for name in names]
         shown += x
         look = place % len(style.SERIES)
-        marker = {"symbol": style.MARKERS[look], "size": 9, "color": style.SERIES[look]}
-        figure.add_scatter(x=x, y=names, mode="markers", name=group, marker=marker)
-    figure.add_scatter(
-        x=[told[name]["value"] for name in names],
-        y=names,
-        mode="markers",
-        name="all, with 95 % interval",
-        marker={"symbol": "line-ns-open", "size": 16, "color": style.BLACK, "line": {"width": 3}},
-        error_x=style.error_bars(
-            [t["value"] for t in told.values()],
-            [(t["low"] or t["value"], t["high"] or t["value"]) for t in told.values()],
-            color=style.BLACK,
-        ),
-    )
+        figure.add_trace(style.points(x, names, group, style.SERIES[look], style.MARKERS[look]))
+    middle = [t["value"] for t in told.values()]
+    ends = [(t["low"] or t["value"], t["high"] or t["value"]) for t in told.values()]
+    bars = style.error_bars(middle, ends, color=style.BLACK)
+    looks = style.BLACK, "line-ns-open", 16, 3
+    figure.add_trace(style.points(middle, names, "all, with 95 % interval", *looks, error_x=bars))
     figure.add_vline(x=1.0, line=style.FLOOR_LINE)
-    ends = [v for t in told.values() for v in (t["low"], t["high"]) if v]
-    figure.update_xaxes(
-        title_text="rms / doing nothing, logarithmic",
-        **log_axis(0.9 * min(*shown, *ends), 1.1 * max(*shown, *ends)),
-    )
+    shown += [v for t in told.values() for v in (t["low"], t["high"]) if v]
+    axis = log_axis(0.9 * min(shown), 1.1 * max(shown))
+    figure.update_xaxes(title_text="rms / doing nothing, logarithmic", **axis)
     figure.update_yaxes(autorange="reversed")
     style.styled(figure, 190 + 34 * len(names))
     words = "; ".join(f"{name} {number(told[name]['value'], 2)}" for name in names)

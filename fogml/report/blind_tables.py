@@ -167,10 +167,7 @@ def reliability_plot(bins: Sequence[Mapping[str, Any]], error: float | None) -> 
     figure.add_scatter(
         x=[part["stated"] for part in bins],
         y=found,
-        error_y={
-            "array": [part["high"] - part["found"] for part in bins],
-            "arrayminus": [part["found"] - part["low"] for part in bins],
-        },
+        error_y=style.error_bars(found, [(part["low"], part["high"]) for part in bins]),
         mode="markers+text",
         text=[str(part["n"]) for part in bins],
         textposition="bottom right",
@@ -199,17 +196,10 @@ def open_set_plot(
     figure = go.Figure()
     figure.add_scatter(x=[0, 1], y=[0, 1], mode="lines", name="chance", line=_CHANCE)
     for place, (name, curve) in enumerate(shown):
-        figure.add_scatter(
-            x=list(curve["false_positive"]),
-            y=list(curve["true_positive"]),
-            mode="lines",
-            name=f"{name} ({number(areas.get(name))})",
-            line={
-                "color": style.SERIES[place % len(style.SERIES)],
-                "dash": style.DASHES[place % len(style.DASHES)],
-                "width": 2.4 if place == 0 else 1.4,
-            },
-        )
+        x, y = list(curve["false_positive"]), list(curve["true_positive"])
+        colour, dash = style.SERIES[place % 7], style.DASHES[place % 7]
+        words, width = f"{name} ({number(areas.get(name))})", 2.4 if place == 0 else 1.4
+        figure.add_trace(style.line(x, y, words, colour, width, dash))
     figure.update_xaxes(title_text="share of cases without an unknown above the threshold", range=[-0.01, 1])
     figure.update_yaxes(title_text="share of cases with one", range=[0, 1.01])
     style.styled(figure, _HEIGHT)
@@ -259,11 +249,6 @@ def confusion_plot(values: Mapping[str, Any]) -> Drawing:
     )
 
 
-def _arm(high: float | None, low: float | None) -> float:
-    """Length of an arm of an error bar; 0 where an end is not told."""
-    return 0.0 if high is None or low is None else high - low
-
-
 def strata_plot(rows: Sequence[Mapping[str, Any]]) -> Drawing:
     """How some figures grow better with the strength of what is missing."""
     figure = go.Figure()
@@ -276,11 +261,7 @@ def strata_plot(rows: Sequence[Mapping[str, Any]]) -> Drawing:
         figure.add_scatter(
             x=names,
             y=values,
-            error_y={
-                "array": [_arm(p["high"], p["value"]) for p in parts.values()],
-                "arrayminus": [_arm(p["value"], p["low"]) for p in parts.values()],
-                "thickness": 1,
-            },
+            error_y=style.error_bars(values, [(p["low"], p["high"]) for p in parts.values()], thickness=1),
             mode="lines+markers",
             name=row["words"].replace(", d′ > 10", ""),
             line={"color": style.SERIES[place % 7], "dash": style.DASHES[place % 7]},

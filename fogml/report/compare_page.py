@@ -186,13 +186,7 @@ def rms_bars(judgements: Mapping[str, Judgement], order: Sequence[str]) -> Drawi
             },
         )
     )
-    figure.add_scatter(
-        x=stability,
-        y=list(order),
-        mode="markers",
-        name="bias stability",
-        marker={"symbol": "diamond", "size": 9, "color": style.BLACK},
-    )
+    figure.add_trace(style.points(stability, list(order), "bias stability", style.BLACK, "diamond"))
     figure.add_vline(x=floor, line=style.FLOOR_LINE)
     figure.add_trace(style.floor_in_legend())
     # Bars have no zero on a logarithmic axis: they begin at a round number below everything.
@@ -232,10 +226,9 @@ def residuals_in_time(judgements: Mapping[str, Judgement], names: Sequence[str],
         series = judged.series
         per_unit, unit = time_unit(float(np.ptp(series.time)))
         x, y = drawn(series.time / per_unit, series.after, gaps=gap_starts(series.time))
-        line = {"color": style.SERIES[row - 1], "width": 1.4}
-        figure.add_scatter(x=x, y=y, mode="lines", name=name, line=line, showlegend=False, row=row, col=1)
-        for value in (judged.floor, -judged.floor):
-            figure.add_hline(y=value, row=row, col=1, line=style.FLOOR_LINE)
+        trace = style.line(x, y, name, style.SERIES[row - 1], 1.4, showlegend=False)
+        figure.add_trace(trace, row=row, col=1)
+        style.floor_lines(figure, judged.floor, row)
         figure.update_yaxes(title_text=f"{name}<br>[deg/h]", title_font_size=12, row=row, col=1)
     series = shown[0][1].series
     shade(figure, segments_of(series.time / per_unit, series.regime))

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from fogml.escaping import script_data
 from fogml.gap.result import Diagnosis
@@ -105,19 +104,15 @@ def _drawing(run: Counterfactual) -> Drawing:
     """Temperature, recorded with replayed, and the gap, as the sliders begin."""
     hours = (run.time_s - run.time_s[0]) / 3600.0
     replayed = run.replayed + sum(c.values for c in run.courses if c.acts)
-    figure = style.stacked([0.7, 1.4, 1.2], 0.05)
-    lines = (
-        (1, run.temperature_degc, "temperature", {"color": style.BLUE, "width": 1.6}),
-        (2, run.recorded, "recorded", {"color": style.BEFORE, "width": 1.3}),
-        (2, replayed, "replayed", {"color": style.MODEL, "width": 2.0, "dash": "dash"}),
-        (3, run.recorded - replayed, "gap", {"color": style.AFTER, "width": 1.3}),
-    )
-    for row, values, name, looks in lines:
-        trace = go.Scatter(x=hours, y=values, mode="lines", name=name, line=looks)
-        figure.add_trace(trace, row=row, col=1)
-    for row, words in enumerate(("T [°C]", "error [deg/h]", "gap [deg/h]"), start=1):
-        figure.update_yaxes(title_text=words, title_font_size=12, row=row, col=1)
-    figure.update_xaxes(title_text="time [h]", row=3, col=1)
+    panels = {"T [°C]": 0.7, "error [deg/h]": 1.4, "gap [deg/h]": 1.2}
+    figure = style.stacked(panels, "time [h]", 0.05, title_font_size=12)
+    for row, values, name, colour, width, dash in (
+        (1, run.temperature_degc, "temperature", style.BLUE, 1.6, None),
+        (2, run.recorded, "recorded", style.BEFORE, 1.3, None),
+        (2, replayed, "replayed", style.MODEL, 2.0, "dash"),
+        (3, run.recorded - replayed, "gap", style.AFTER, 1.3, None),
+    ):
+        figure.add_trace(style.line(hours, values, name, colour, width, dash), row=row, col=1)
     style.styled(figure, 560, legend={"y": 1.06}, hovermode="x")
     return Drawing(
         figure,

@@ -33,13 +33,9 @@ def distribution(fleet: Mapping[str, Any]) -> Drawing:
         ("after", "after", style.GREEN, "solid"),
     ):
         values = sorted(unit[key] for unit in judged)
+        stairs = {"color": colour, "dash": dash, "shape": "hv"}
         figure.add_scatter(
-            x=values,
-            y=shares,
-            mode="lines+markers",
-            name=name,
-            line={"color": colour, "dash": dash, "shape": "hv"},
-            marker={"size": 5},
+            x=values, y=shares, mode="lines+markers", name=name, line=stairs, marker={"size": 5}
         )
     floor = fleet["distribution"]["floor"]["median"]
     figure.add_vline(x=floor, line=style.FLOOR_LINE)
@@ -72,22 +68,11 @@ def by_unit(fleet: Mapping[str, Any], order: Sequence[Mapping[str, Any]], outlie
         ("after", "circle", style.GREEN),
         ("floor", "line-ew-open", style.BLACK),
     ):
-        figure.add_scatter(
-            x=labels,
-            y=[unit[key] for unit in units],
-            mode="markers",
-            name="noise floor" if key == "floor" else key,
-            marker={"symbol": symbol, "size": 9, "color": colour},
-        )
-    odd = [unit for unit in units if label_of(unit) in outliers]
+        name = "noise floor" if key == "floor" else key
+        figure.add_trace(style.points(labels, [unit[key] for unit in units], name, colour, symbol))
+    odd = {label_of(unit): unit["after"] for unit in units if label_of(unit) in outliers}
     if odd:
-        figure.add_scatter(
-            x=[label_of(unit) for unit in odd],
-            y=[unit["after"] for unit in odd],
-            mode="markers",
-            name="unlike the others",
-            marker=style.ring(17),
-        )
+        figure.add_trace(style.ring(list(odd), list(odd.values()), "unlike the others", 17))
     every = [v for unit in units for v in (unit["before"], unit["after"], unit["floor"]) if v]
     figure.update_yaxes(title_text="rms [deg/h], logarithmic", **log_axis(*every))
     serial_axis(figure, labels)
@@ -111,16 +96,10 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
     for place, name in enumerate(names):
         row, column = place // _COLUMNS + 1, place % _COLUMNS + 1
         mean, std = found["mean"][place], found["std"][place]
-        figure.add_scatter(
-            x=labels,
-            y=values[:, place],
-            mode="markers",
-            error_y={"type": "data", "array": errors[:, place], "thickness": 1, "width": 2},
-            marker={"size": 7, "color": style.BLUE},
-            showlegend=False,
-            row=row,
-            col=column,
-        )
+        bars = {"type": "data", "array": errors[:, place], "thickness": 1, "width": 2}
+        own = values[:, place]
+        trace = style.points(labels, own, None, style.BLUE, size=7, error_y=bars, showlegend=False)
+        figure.add_trace(trace, row, column)
         for end in (mean - 2 * std, mean + 2 * std):
             figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=column)
         title = "constant<br>[deg/h]" if name == "1" else f"{name}<br>[deg/h per its unit]"

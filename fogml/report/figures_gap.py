@@ -33,28 +33,14 @@ def how_far_strip(items: Sequence[HowFar], named: bool) -> Drawing:
     labels = [item.run for item in items]
     figure = go.Figure()
     for item in items:
-        figure.add_scatter(
-            x=[item.before, item.recalibrated, item.after],
-            y=[item.run] * 3,
-            mode="lines",
-            line={"color": style.GREY, "width": 1.2},
-            showlegend=False,
-            hoverinfo="skip",
-        )
+        x = [item.before, item.recalibrated, item.after]
+        figure.add_trace(style.line(x, [item.run] * 3, None, style.GREY, 1.2, **style.SILENT))
     for key, words, symbol, colour in _STAGES:
-        if key == "after" and not named:
-            continue
-        marker = {"symbol": symbol, "color": colour, "size": 12, "line": {"width": 2}}
-        figure.add_scatter(
-            x=[getattr(item, key) for item in items], y=labels, mode="markers", name=words, marker=marker
-        )
-    figure.add_scatter(
-        x=[item.floor for item in items],
-        y=labels,
-        mode="markers",
-        name="noise floor",
-        marker={"symbol": "line-ns", "size": 18, "line": {"width": 2.5, "color": style.FLOOR}},
-    )
+        if key != "after" or named:
+            x = [getattr(item, key) for item in items]
+            figure.add_trace(style.points(x, labels, words, colour, symbol, 12, 2))
+    floors = [item.floor for item in items]
+    figure.add_trace(style.points(floors, labels, "noise floor", style.FLOOR, "line-ns-open", 18, 2.5))
     values = [v for i in items for v in (i.before, i.recalibrated, i.after, i.floor) if v > 0.0] or [1.0]
     over = averages(items[0].averaging_s)
     figure.update_xaxes(title_text=f"rms of {over} [deg/h]", **log_axis(min(values), max(values)))
@@ -74,44 +60,31 @@ def run_in_time(series: RunSeries, segments: Sequence[GapSegment], named: bool) 
     per_unit, unit = time_unit(float(np.ptp(series.time_s)))
     time = series.time_s / per_unit
     gaps = gap_starts(series.time_s) if len(time) > 2 else np.empty(0, dtype=np.intp)
-    panels = ["temperature", "output", "recalibrated", *(["after"] if named else [])]
-    heights = {"temperature": 0.75, "output": 1.3, "recalibrated": 1.15, "after": 1.15}
-    figure = style.stacked([heights[panel] for panel in panels], 0.04)
-
-    def line(panel: str, values: FloatArray, name: str, **looks: Any) -> None:
-        x, y = drawn(time, values, gaps=gaps)
-        trace = go.Scatter(x=x, y=y, mode="lines", name=name, line=looks, showlegend=panel == "output")
-        figure.add_trace(trace, row=panels.index(panel) + 1, col=1)
-
-    line("temperature", series.temperature_degc, "temperature", color=style.BLUE, width=1.6)
-    line("output", series.replayed_before, "nominal twin", color=style.GREY, width=1.6, dash="dot")
-    line("output", series.recorded, "recorded", color=style.BEFORE, width=1.3)
-    replayed = {"color": style.SKY_BLUE, "width": 2.0, "dash": "dashdot"}
-    line("output", series.replayed_recalibrated, "recalibrated twin", **replayed)
-    line("recalibrated", series.gap_recalibrated, "gap, recalibrated", color=style.BEFORE, width=1.3)
+    panels = {"T [°C]": 0.75, "error [deg/h]": 1.3, "gap before [deg/h]": 1.15}
     if named:
-        found = {"color": style.MODEL, "width": 2.0, "dash": "dash"}
-        line("output", series.replayed_after, "with what was found", **found)
-        line("after", series.gap_after, "gap, with what was found", color=style.AFTER, width=1.3)
-    off_panel = _output_range(figure, series, panels.index("output") + 1)
+        panels["gap after [deg/h]"] = 1.15
+    figure = style.stacked(panels, f"time [{unit}]", 0.04, title_font_size=12)
+
+    def line(row: int, values: FloatArray, name: str, *looks: Any) -> None:
+        trace = style.line(*drawn(time, values, gaps=gaps), name, *looks, showlegend=row == 2)
+        figure.add_trace(trace, row=row, col=1)
+
+    line(1, series.temperature_degc, "temperature", style.BLUE, 1.6)
+    line(2, series.replayed_before, "nominal twin", style.GREY, 1.6, "dot")
+    line(2, series.recorded, "recorded", style.BEFORE, 1.3)
+    line(2, series.replayed_recalibrated, "recalibrated twin", style.SKY_BLUE, 2.0, "dashdot")
+    line(3, series.gap_recalibrated, "gap, recalibrated", style.BEFORE, 1.3)
+    if named:
+        line(2, series.replayed_after, "with what was found", style.MODEL, 2.0, "dash")
+        line(4, series.gap_after, "gap, with what was found", style.AFTER, 1.3)
+    off_panel = _output_range(figure, series, 2)
     low, high = _gap_range(series)
-    for panel in panels[2:]:
-        row = panels.index(panel) + 1
+    for row in range(3, len(panels) + 1):
         figure.update_yaxes(range=[low, high], row=row, col=1)
-        for value in (series.floor, -series.floor):
-            figure.add_hline(y=value, row=row, col=1, line=style.FLOOR_LINE)
+        style.floor_lines(figure, series.floor, row)
     figure.add_trace(style.floor_in_legend(), row=3, col=1)
     _mark_segments(figure, segments, per_unit, low + 0.96 * (high - low))
     tinted = shade(figure, segments_of(time, np.asarray(Regimes.names)[series.regime]))
-    words = {
-        "temperature": "T [°C]",
-        "output": "error [deg/h]",
-        "recalibrated": "gap before [deg/h]",
-        "after": "gap after [deg/h]",
-    }
-    for row, panel in enumerate(panels, start=1):
-        figure.update_yaxes(title_text=words[panel], title_font_size=12, row=row, col=1)
-    figure.update_xaxes(title_text=f"time [{unit}]", row=len(panels), col=1)
     style.styled(figure, 150 + 135 * len(panels), legend={"y": 1.06}, hovermode="x")
     return Drawing(
         figure,
@@ -155,20 +128,10 @@ def _gap_range(series: RunSeries) -> tuple[float, float]:
 
 
 def _mark_segments(figure: go.Figure, segments: Sequence[GapSegment], per_unit: float, height: float) -> None:
-    if not segments:
-        return
-    x: list[float | None] = []
-    for segment in segments:
-        x += [segment.from_s / per_unit, segment.to_s / per_unit, None]
-    figure.add_scatter(
-        x=x,
-        y=[height if value is not None else None for value in x],
-        mode="lines",
-        name="over the floor",
-        line={"color": style.VERMILION, "width": 7},
-        row=3,
-        col=1,
-    )
+    x = [end for s in segments for end in (s.from_s / per_unit, s.to_s / per_unit, None)]
+    if x:
+        y = [height, height, None] * len(segments)
+        figure.add_trace(style.line(x, y, "over the floor", style.VERMILION, 7), row=3, col=1)
 
 
 def _time_alt(series: RunSeries, segments: Sequence[GapSegment], named: bool) -> str:
@@ -234,23 +197,13 @@ def against_temperature(found: Diagnosis) -> Drawing:
             if rows.size == 0:
                 continue
             rows = rows[min_max_indices(values[rows], DRAWN_POINTS // 2)]
-            marker = {"color": colour, "symbol": symbol, "size": 5.5, "opacity": 0.6}
-            figure.add_scatter(
-                x=temperature[rows],
-                y=values[rows],
-                mode="markers",
-                name=words,
-                legendgroup=words,
-                showlegend=column == 1,
-                marker=marker,
-                row=1,
-                col=column,
-            )
+            looks = style.grouped(words, column == 1) | {"marker_opacity": 0.6}
+            trace = style.points(temperature[rows], values[rows], words, colour, symbol, 5.5, **looks)
+            figure.add_trace(trace, row=1, col=column)
         if column == 1:
             _means(figure, found.where.temperature)
         floor = float(np.mean([s.floor for s in series]))
-        for value in (floor, -floor):
-            figure.add_hline(y=value, row=1, col=column, line=style.FLOOR_LINE)
+        style.floor_lines(figure, floor, 1, column)
     figure.add_trace(style.floor_in_legend(), row=1, col=1)
     figure.update_xaxes(title_text="T [°C]")
     figure.update_yaxes(title_text="gap [deg/h]", row=1, col=1)
@@ -276,8 +229,7 @@ def _means(figure: go.Figure, bins: Sequence[TemperatureExcess]) -> None:
         points = [(t, value) for t, value in points if value is not None]
         if points:
             x, y = zip(*points, strict=True)
-            line = {"color": colour, "width": 3, "dash": dash}
-            figure.add_scatter(x=x, y=y, mode="lines", name=words, line=line, row=1, col=1)
+            figure.add_trace(style.line(x, y, words, colour, 3, dash), row=1, col=1)
 
 
 def _parted(bins: Sequence[TemperatureExcess]) -> str:

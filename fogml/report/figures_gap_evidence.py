@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -68,16 +69,9 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
     ):
         rows = [e for e in shown if (e.usual_length < _LEAST_DRAWN) is small]
         if rows:
-            figure.add_scatter(
-                x=[max(e.usual_length, _LEAST_DRAWN) for e in rows],
-                y=[e.title for e in rows],
-                mode="markers",
-                name=words,
-                showlegend=small,
-                marker={"symbol": symbol, "size": 9, "color": style.BLACK, "line": {"width": 1.8}},
-                row=1,
-                col=2,
-            )
+            x, y = [max(e.usual_length, _LEAST_DRAWN) for e in rows], [e.title for e in rows]
+            trace = style.points(x, y, words, style.BLACK, symbol, 9, 1.8, showlegend=small)
+            figure.add_trace(trace, row=1, col=2)
     figure.add_vline(x=LEAST_LENGTH, row=1, col=2, line=style.FLOOR_LINE)
     low, high = _folded(min(0.0, *(e.gain for e in shown))), _folded(max(3.0, *(e.gain for e in shown)))
     room = 0.04 * (high - low)
@@ -129,15 +123,8 @@ def amplitude_by_run(found: Found, names: dict[str, str]) -> Drawing:
         x0=value - Z90 * se, x1=value + Z90 * se, fillcolor="rgba(0, 158, 115, 0.18)", line_width=0
     )
     figure.add_vline(x=value, line={"color": style.AFTER, "width": 1.6})
-    figure.add_scatter(
-        x=[item.value for item in found.by_run],
-        y=labels,
-        mode="markers",
-        name="one run alone",
-        showlegend=False,
-        marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
-        error_x={"type": "data", "array": [Z90 * item.se for item in found.by_run], "width": 5},
-    )
+    values, errors = [item.value for item in found.by_run], [item.se for item in found.by_run]
+    figure.add_trace(_estimates("one run alone", labels, values, errors))
     figure.add_vline(x=0.0, line={"color": style.BLACK, "width": 1, "dash": "dot"})
     figure.update_xaxes(title_text=f"amplitude [{unit}]")
     figure.update_yaxes(categoryorder="array", categoryarray=labels[::-1], type="category")
@@ -156,6 +143,14 @@ def amplitude_by_run(found: Found, names: dict[str, str]) -> Drawing:
     )
 
 
+def _estimates(
+    name: str, labels: Sequence[str], values: Sequence[float], errors: Sequence[float]
+) -> go.Scatter:
+    """A row for each value, with its interval of 90 %."""
+    bars = {"type": "data", "array": [Z90 * se for se in errors], "width": 5}
+    return style.points(values, labels, name, style.BEFORE, error_x=bars, showlegend=False)
+
+
 def constants_moved(constants: Sequence[ConstantFit]) -> Drawing:
     """How far each constant moved from its prior, in the prior's standard deviations."""
     shown = [c for c in constants if c.prior_sd > 0.0]
@@ -163,27 +158,20 @@ def constants_moved(constants: Sequence[ConstantFit]) -> Drawing:
     figure = go.Figure()
     for reach, tint in ((2.0, "rgba(0, 114, 178, 0.08)"), (1.0, "rgba(0, 114, 178, 0.14)")):
         figure.add_vrect(x0=-reach, x1=reach, fillcolor=tint, line_width=0)
-    figure.add_scatter(
-        x=[(c.value - c.prior_mean) / c.prior_sd for c in shown],
-        y=labels,
-        mode="markers",
-        name="fitted",
-        showlegend=False,
-        marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
-        error_x={"type": "data", "array": [Z90 * c.se / c.prior_sd for c in shown], "width": 5},
-    )
+    moved = [(c.value - c.prior_mean) / c.prior_sd for c in shown]
+    figure.add_trace(_estimates("fitted", labels, moved, [c.se / c.prior_sd for c in shown]))
     figure.update_xaxes(title_text="fitted less prior mean [prior standard deviations]")
     figure.update_yaxes(categoryorder="array", categoryarray=labels[::-1], type="category")
     style.styled(figure, 110 + 27 * len(shown), margin={"t": 12})
-    far = [c for c in shown if abs(c.value - c.prior_mean) > 3.0 * c.prior_sd]
+    far = [name for name, distance in zip(labels, moved) if abs(distance) > 3.0]
     return Drawing(
         figure,
         alt="Constants less their prior means, in prior standard deviations: "
-        + "; ".join(f"{c.name} {number((c.value - c.prior_mean) / c.prior_sd)}" for c in shown)
+        + "; ".join(f"{name} {number(distance)}" for name, distance in zip(labels, moved))
         + ".",
         caption="Fitted with 90 % intervals; bands: one and two standard deviations of the prior. An "
         "interval as wide as the prior says that these runs tell nothing of that constant."
-        + (f" Beyond three: {', '.join(c.name for c in far)}." if far else ""),
+        + (f" Beyond three: {', '.join(far)}." if far else ""),
         half=True,
     )
 
@@ -193,19 +181,10 @@ def variance_ratios(noise: NoiseReport) -> Drawing:
     scales, ratios = np.asarray(noise.scales_s), np.asarray(noise.variance_ratio)
     blocks = np.maximum(noise.samples * scales[0] / scales, 1.0)
     reach = Z95 * np.sqrt(2.0 / blocks)
-    figure = go.Figure(
-        [
-            _band(scales, np.maximum(1.0 - reach, 0.02), 1.0 + reach),
-            go.Scatter(
-                x=scales,
-                y=ratios,
-                mode="lines+markers",
-                name="held-out data",
-                marker={"symbol": "circle", "size": 8, "color": style.BEFORE},
-                line={"color": style.BEFORE, "width": 1.2},
-            ),
-        ]
-    )
+    dots = {"symbol": "circle", "size": 8, "color": style.BEFORE}
+    joined: dict[str, Any] = {"mode": "lines+markers", "marker": dots}
+    data = style.line(scales, ratios, "held-out data", style.BEFORE, 1.2, **joined)
+    figure = go.Figure([_band(scales, np.maximum(1.0 - reach, 0.02), 1.0 + reach), data])
     figure.add_hline(y=1.0, line=style.FLOOR_LINE)
     seen = [0.5, 2.0, *(float(r) for r in ratios if r > 0.05)]
     figure.update_xaxes(title_text="time scale [s]", **log_axis(float(scales[0]), float(scales[-1])))
@@ -225,18 +204,8 @@ def autocorrelations(noise: NoiseReport) -> Drawing:
     """Autocorrelation of the innovations on held-out data."""
     lags = np.asarray(noise.lags_s)
     reach = np.full(len(lags), Z95 / math.sqrt(max(noise.samples, 1)))
-    figure = go.Figure(
-        [
-            _band(lags, -reach, reach),
-            go.Scatter(
-                x=lags,
-                y=list(noise.autocorrelation),
-                mode="markers",
-                name="held-out data",
-                marker={"symbol": "circle", "size": 8, "color": style.BEFORE},
-            ),
-        ]
-    )
+    data = style.points(lags, list(noise.autocorrelation), "held-out data", style.BEFORE, size=8)
+    figure = go.Figure([_band(lags, -reach, reach), data])
     figure.add_hline(y=0.0, line={"color": style.BLACK, "width": 1})
     high = max(0.1, *(1.15 * abs(v) for v in noise.autocorrelation))
     figure.update_xaxes(title_text="lag [s]", **log_axis(float(lags[0]), float(lags[-1])))
@@ -252,13 +221,5 @@ def autocorrelations(noise: NoiseReport) -> Drawing:
 
 
 def _band(x: np.ndarray, low: np.ndarray, high: np.ndarray) -> go.Scatter:
-    return go.Scatter(
-        x=np.concatenate([x, x[::-1]]),
-        y=np.concatenate([high, low[::-1]]),
-        mode="lines",
-        line={"color": style.GREY, "width": 0},
-        fill="toself",
-        fillcolor="rgba(0, 158, 115, 0.20)",
-        name="95 % of right models",
-        hoverinfo="skip",
-    )
+    outline = np.concatenate([x, x[::-1]]), np.concatenate([high, low[::-1]])
+    return style.band(*outline, "95 % of right models", "rgba(0, 158, 115, 0.20)")

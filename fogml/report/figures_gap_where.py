@@ -43,16 +43,9 @@ def _points(
         value = [float((x if horizontal else y)[i]) for i in rows]
         spread = style.error_bars(value, [bounds[i] for i in rows], thickness=1.6, width=5)
         colour = style.MODEL if wanted else style.GREY
-        traces.append(
-            go.Scatter(
-                x=[x[i] for i in rows],
-                y=[y[i] for i in rows],
-                mode="markers",
-                name=words,
-                marker={"symbol": symbol, "color": colour, "size": 10, "line": {"width": 2}},
-                **{"error_x" if horizontal else "error_y": spread},
-            )
-        )
+        bars = {"error_x" if horizontal else "error_y": spread}
+        there = [x[i] for i in rows], [y[i] for i in rows]
+        traces.append(style.points(*there, words, colour, symbol, 10, 2, **bars))
     return traces
 
 

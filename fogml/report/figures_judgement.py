@@ -42,36 +42,29 @@ def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = Non
     per_unit, unit = time_unit(float(np.ptp(series.time)))
     time = series.time / per_unit
     gaps = gap_starts(series.time)
-    panels = ["temperature", "drift", "left"] if has_temperature(series) else ["drift", "left"]
-    heights = {"temperature": 1.0, "drift": 1.5, "left": 1.5}
-    figure = style.stacked([heights[panel] for panel in panels], 0.045)
+    warmed = {"T [°C]": 1.0} if has_temperature(series) else {}
+    panels = {**warmed, "drift [deg/h]": 1.5, "left [deg/h]": 1.5}
+    figure, last = style.stacked(panels, f"time [{unit}]", 0.045), len(panels)
 
-    def line(panel: str, values: FloatArray, name: str, **looks: Any) -> None:
-        x, y = drawn(time, values, gaps=gaps)
-        trace = go.Scatter(x=x, y=y, mode="lines", name=name, line=looks, showlegend=panel != "temperature")
-        figure.add_trace(trace, row=panels.index(panel) + 1, col=1)
+    def line(row: int, values: FloatArray, name: str, *looks: Any) -> None:
+        trace = style.line(*drawn(time, values, gaps=gaps), name, *looks, showlegend=row > last - 2)
+        figure.add_trace(trace, row=row, col=1)
 
-    last = len(panels)
-    if "temperature" in panels:
-        line("temperature", series.temperature, "temperature", color=style.BLUE, width=1.6)
-    line("drift", series.before, "drift before", color=style.BEFORE, width=1.4)
-    line("drift", series.before - series.after, "model", color=style.MODEL, width=2, dash="dash")
+    if warmed:
+        line(1, series.temperature, "temperature", style.BLUE, 1.6)
+    line(last - 1, series.before, "drift before", style.BEFORE, 1.4)
+    line(last - 1, series.before - series.after, "model", style.MODEL, 2, "dash")
     banded = bool(np.isfinite(series.upper).any())
     if banded:
         figure.add_trace(_band(time, series, gaps), row=last, col=1)
-    line("left", series.after, "left after", color=style.AFTER, width=1.4)
+    line(last, series.after, "left after", style.AFTER, 1.4)
     _mark_flagged(figure, time, series, last)
-    for value in (judged.floor, -judged.floor):
-        figure.add_hline(y=value, row=last, col=1, line=style.FLOOR_LINE)
+    style.floor_lines(figure, judged.floor, last)
     figure.add_trace(style.floor_in_legend(), row=last, col=1)
     low, high = _left_span(judged)
     figure.update_yaxes(range=[low, high], row=last, col=1)
     clipped = banded and bool(np.nanmax(series.upper) > high or np.nanmin(series.lower) < low)
     named = shade(figure, segments_of(time, series.regime))
-    titles = {"temperature": "T [°C]", "drift": "drift [deg/h]", "left": "left [deg/h]"}
-    for row, panel in enumerate(panels, start=1):
-        figure.update_yaxes(title_text=titles[panel], row=row, col=1)
-    figure.update_xaxes(title_text=f"time [{unit}]", row=last, col=1)
     style.styled(figure, 140 + 150 * last, legend={"y": 1.05}, hovermode="x")
     words = ", ".join(regime_word(name) for name in named)
     return Drawing(
@@ -133,16 +126,8 @@ def _band(time: FloatArray, series: AveragedSeries, gaps: IndexArray) -> go.Scat
         lower, upper = (rows[min_max_indices(v[rows], points)] for v in (series.lower, series.upper))
         sides_x += [time[lower], time[upper][::-1], pen_up]
         sides_y += [series.lower[lower], series.upper[upper][::-1], pen_up]
-    return go.Scatter(
-        x=np.concatenate(sides_x),
-        y=np.concatenate(sides_y),
-        mode="lines",
-        line={"color": style.AFTER, "width": 0},
-        fill="toself",
-        fillcolor="rgba(0, 158, 115, 0.22)",
-        name="90 % band",
-        hoverinfo="skip",
-    )
+    outline = np.concatenate(sides_x), np.concatenate(sides_y)
+    return style.band(*outline, "90 % band", "rgba(0, 158, 115, 0.22)")
 
 
 def _mark_flagged(figure: go.Figure, time: FloatArray, series: AveragedSeries, row: int) -> None:
@@ -150,8 +135,7 @@ def _mark_flagged(figure: go.Figure, time: FloatArray, series: AveragedSeries, r
         rows = np.flatnonzero(series.flag == flag)
         if rows.size:
             rows = rows[min_max_indices(series.after[rows], DRAWN_POINTS // 4)]
-            marker = {"symbol": symbol, "color": colour, "size": 6, "line": {"width": 1.2}}
-            trace = go.Scatter(x=time[rows], y=series.after[rows], mode="markers", marker=marker, name=words)
+            trace = style.points(time[rows], series.after[rows], words, colour, symbol, 6, 1.2)
             figure.add_trace(trace, row=row, col=1)
 
 
@@ -166,18 +150,10 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
     )
     for other in train:
         kept = min_max_indices(other.series.before, DRAWN_POINTS // 4)
-        figure.add_scatter(
-            x=other.series.temperature[kept],
-            y=other.series.before[kept],
-            mode="markers",
-            name="training runs",
-            legendgroup="train",
-            showlegend=other is train[0],
-            hovertext=other.run,
-            marker={"symbol": "x-thin", "size": 6, "line": {"color": style.TRAINING, "width": 1}},
-            row=1,
-            col=1,
-        )
+        x, y = other.series.temperature[kept], other.series.before[kept]
+        looks = style.TRAINING, "x-thin-open", 6, 1
+        told = style.grouped("train", other is train[0]) | {"hovertext": other.run}
+        figure.add_trace(style.points(x, y, "training runs", *looks, **told), row=1, col=1)
     direction = direction_of(series)
     for words, colour, symbol, sign in _DIRECTIONS:
         rows = np.flatnonzero(direction == sign)
@@ -185,30 +161,13 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
             continue
         for column, values in ((1, series.before), (2, series.after)):
             kept = rows[min_max_indices(values[rows], DRAWN_POINTS // 2)]
-            figure.add_scatter(
-                x=series.temperature[kept],
-                y=values[kept],
-                mode="markers",
-                name=words,
-                legendgroup=words,
-                showlegend=column == 1,
-                marker={"color": colour, "symbol": symbol, "size": 5.5, "opacity": 0.75},
-                row=1,
-                col=column,
-            )
+            x, y = series.temperature[kept], values[kept]
+            told = style.grouped(words, column == 1) | {"marker_opacity": 0.75}
+            figure.add_trace(style.points(x, y, words, colour, symbol, 5.5, **told), row=1, col=column)
     x, y = drawn(series.time, series.before - series.after)
     temperature = np.interp(x, series.time, series.temperature)
-    figure.add_scatter(
-        x=temperature,
-        y=y,
-        mode="lines",
-        name="model",
-        line={"color": style.BLACK, "width": 1.8},
-        row=1,
-        col=1,
-    )
-    for value in (judged.floor, -judged.floor):
-        figure.add_hline(y=value, row=1, col=2, line=style.FLOOR_LINE)
+    figure.add_trace(style.line(temperature, y, "model", style.BLACK, 1.8), row=1, col=1)
+    style.floor_lines(figure, judged.floor, 1, 2)
     figure.add_trace(style.floor_in_legend(), row=1, col=2)
     figure.update_xaxes(title_text="T [°C]")
     figure.update_yaxes(title_text="drift [deg/h]", row=1, col=1)
@@ -251,8 +210,7 @@ def rms_by_regime(judged: RunJudgement) -> Drawing:
     for index, (name, colour, symbol) in enumerate(
         (("before", style.BEFORE, "diamond-open"), ("after", style.AFTER, "circle")), start=1
     ):
-        marker = {"symbol": symbol, "color": colour, "size": 11, "line": {"width": 2}}
-        figure.add_scatter(x=[row[index] for row in rows], y=labels, mode="markers", name=name, marker=marker)
+        figure.add_trace(style.points([row[index] for row in rows], labels, name, colour, symbol, 11, 2))
     floor = judged.floor
     figure.add_vline(x=floor, line=style.FLOOR_LINE)
     figure.add_trace(style.floor_in_legend())

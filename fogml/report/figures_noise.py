@@ -56,41 +56,19 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
     figure = go.Figure()
     intervals = np.asarray(noise["ci"], dtype=np.float64) if len(noise.get("ci", ())) == len(taus) else None
     if intervals is not None and len(taus):
-        figure.add_scatter(
-            x=np.concatenate([taus, taus[::-1]]),
-            y=np.concatenate([intervals[:, 1], intervals[::-1, 0]]),
-            fill="toself",
-            mode="lines",
-            line={"width": 0, "color": style.BLUE},
-            fillcolor="rgba(0, 114, 178, 0.20)",
-            name=f"{percent(float(noise.get('level', 0.9)), 0)} interval",
-            hoverinfo="skip",
-        )
+        outline = np.concatenate([taus, taus[::-1]]), np.concatenate([intervals[:, 1], intervals[::-1, 0]])
+        words = f"{percent(float(noise.get('level', 0.9)), 0)} interval"
+        figure.add_trace(style.band(*outline, words, "rgba(0, 114, 178, 0.20)"))
     shown = _term_lines(figure, noise, taus, adev)
     shown += _model_lines(figure, noise, taus)
     shown += _floor_line(figure, noise)
-    figure.add_scatter(
-        x=taus,
-        y=adev,
-        mode="lines+markers",
-        name="Allan deviation",
-        line={"color": style.BLUE, "width": 2},
-        marker={"size": 5},
-    )
+    dotted: dict[str, Any] = {"mode": "lines+markers", "marker": {"size": 5}}
+    figure.add_trace(style.line(taus, adev, "Allan deviation", style.BLUE, 2, **dotted))
     minimum = noise.get("minimum") or {}
     if minimum.get("adev"):
-        figure.add_scatter(
-            x=[minimum["tau_s"]],
-            y=[minimum["adev"]],
-            mode="markers",
-            name="minimum",
-            marker={
-                "symbol": "star",
-                "size": 14,
-                "color": style.YELLOW,
-                "line": {"width": 1, "color": style.BLACK},
-            },
-        )
+        x, y = [minimum["tau_s"]], [minimum["adev"]]
+        looks: dict[str, Any] = {"symbol": "star", "size": 14, "edge": 1, "marker_line_color": style.BLACK}
+        figure.add_trace(style.points(x, y, "minimum", style.YELLOW, **looks))
     figure.update_xaxes(title_text="averaging time τ [s]", **log_axis(taus[0], taus[-1], room=0.03))
     figure.update_yaxes(
         title_text="Allan deviation [deg/h]", **log_axis(*_span(adev, intervals, noise.get("floor")))
@@ -122,13 +100,7 @@ def _model_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray) 
     model = noise.get("model") or {}
     told = ""
     if len(model.get("adev", ())) == len(taus):
-        figure.add_scatter(
-            x=taus,
-            y=model["adev"],
-            mode="lines",
-            name="noise model",
-            line={"color": style.BLACK, "width": 1.2},
-        )
+        figure.add_trace(style.line(taus, model["adev"], "noise model", style.BLACK, 1.2))
         told = " Thin black: the fitted model"
         if noise.get("filter") and noise["filter"]["kind"] != "other":
             told += f" behind its output filter ({noise['filter']['words']})"
@@ -185,12 +157,9 @@ def _term_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray, a
         if not near.any():
             continue
         drawn.append(name)
-        line = {
-            "color": style.SERIES[(index + 1) % 7],
-            "dash": ("dot", "dash", "longdash", "dashdot", "longdashdot")[index],
-            "width": 1.6,
-        }
-        figure.add_scatter(x=taus[near], y=alone[near], mode="lines", name=f"{name} {words}", line=line)
+        dash = ("dot", "dash", "longdash", "dashdot", "longdashdot")[index]
+        looks = style.SERIES[(index + 1) % 7], 1.6, dash
+        figure.add_trace(style.line(taus[near], alone[near], f"{name} {words}", *looks))
     if not drawn:
         return "The data support none."
     return (

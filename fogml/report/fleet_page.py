@@ -275,14 +275,8 @@ def line_figure(line: Mapping[str, Any]) -> Drawing:
     ):
         middle = [100.0 * cause[key] for cause in causes]
         ends = [[100.0 * end for end in cause[f"{key}_ci90"]] for cause in causes]
-        figure.add_scatter(
-            x=middle,
-            y=names,
-            mode="markers",
-            name=words,
-            marker={"size": 9, "color": colour, "symbol": symbol},
-            error_x=style.error_bars(middle, ends, thickness=1, width=3, color=colour),
-        )
+        bars = style.error_bars(middle, ends, thickness=1, width=3, color=colour)
+        figure.add_trace(style.points(middle, names, words, colour, symbol, error_x=bars))
     figure.update_xaxes(title_text="share [%]", range=[0, 102])
     style.styled(figure, 130 + 34 * len(names))
     first = causes[-1]

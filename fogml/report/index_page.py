@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.arrays import FloatArray
@@ -199,25 +198,29 @@ def loops(judgements: Mapping[str, Judgement]) -> Drawing:
     told = []
     for column, (axis, judgement) in enumerate(judgements.items(), start=1):
         train, test = judgement.train[0], judgement.test[0]
-        _points(figure, column, train.series, f"training: {train.run}", style.WARMING, "triangle-up")
-        _points(figure, column, test.series, f"test: {test.run}", style.COOLING, "triangle-down")
+        for what, run, colour, symbol in (
+            ("training", train, style.WARMING, "triangle-up"),
+            ("test", test, style.COOLING, "triangle-down"),
+        ):
+            kept = min_max_indices(run.series.before, DRAWN_POINTS // 2)
+            x, y = run.series.temperature[kept], run.series.before[kept]
+            more = {
+                "marker_opacity": 0.7,
+                "hovertext": f"{what}: {run.run}",
+                **style.grouped(what, column == 1),
+            }
+            figure.add_trace(style.points(x, y, f"{what} run", colour, symbol, 4.5, **more), 1, column)
         kept = min_max_indices(test.series.after, DRAWN_POINTS // 2)
-        model = (test.series.before - test.series.after)[kept]
-        _line(figure, 1, column, test.series.temperature[kept], model, "model on the test run", style.BLACK)
-        marker = {"color": style.AFTER, "symbol": "circle", "size": 4.5, "opacity": 0.8}
-        figure.add_scatter(
-            x=test.series.temperature[kept],
-            y=test.series.after[kept],
-            mode="markers",
-            marker=marker,
-            name="left on the test run",
-            legendgroup="left",
-            showlegend=column == 1,
-            row=2,
-            col=column,
+        temperature, left = test.series.temperature[kept], test.series.after[kept]
+        model, name = test.series.before[kept] - left, "model on the test run"
+        looks = style.BLACK, 1.8
+        figure.add_trace(
+            style.line(temperature, model, name, *looks, **style.grouped(name, column == 1)), 1, column
         )
-        for value in (test.floor, -test.floor):
-            figure.add_hline(y=value, row=2, col=column, line=style.FLOOR_LINE)
+        more = style.grouped("left", column == 1) | {"marker_opacity": 0.8}
+        trace = style.points(temperature, left, "left on the test run", style.AFTER, size=4.5, **more)
+        figure.add_trace(trace, 2, column)
+        style.floor_lines(figure, test.floor, 2, column)
         figure.update_xaxes(title_text="T [°C]", row=2, col=column)
         loop = loop_between(train.series, test.series)
         if loop is not None:
@@ -239,35 +242,3 @@ def loops(judgements: Mapping[str, Judgement]) -> Drawing:
             "Bottom, on its own scale: what the model leaves; dashed, the noise floor."
         ),
     )
-
-
-def _points(
-    figure: go.Figure, column: int, series: AveragedSeries, name: str, colour: str, symbol: str
-) -> None:
-    kept = min_max_indices(series.before, DRAWN_POINTS // 2)
-    figure.add_scatter(
-        x=series.temperature[kept],
-        y=series.before[kept],
-        mode="markers",
-        marker={"color": colour, "symbol": symbol, "size": 4.5, "opacity": 0.7},
-        name=name.split(":")[0] + " run",
-        hovertext=name,
-        legendgroup=name.split(":")[0],
-        showlegend=column == 1,
-        row=1,
-        col=column,
-    )
-
-
-def _line(
-    figure: go.Figure,
-    row: int,
-    column: int,
-    x: FloatArray,
-    y: FloatArray,
-    name: str,
-    colour: str,
-) -> None:
-    line = {"color": colour, "width": 1.8}
-    trace = go.Scatter(x=x, y=y, mode="lines", line=line, name=name, legendgroup=name, showlegend=column == 1)
-    figure.add_trace(trace, row=row, col=column)

@@ -189,36 +189,31 @@ _AVERAGES = 1000
 def recording(run: Run) -> Drawing:
     """Output, temperatures, table rate and temperature rates of a run in time, regimes shaded."""
     rates = temperature_rates(run)
-    rows = ["gyro"]
-    rows += ["temperature"] if run.temperature_columns else []
-    rows += ["change"] if rates else []
-    rows += ["rate"] if np.any(run.rate) else []
-    figure = style.stacked([1.6, *[1.2] * (len(rows) - 1)], 0.035)
+    shown = {
+        f"gyro [{run.gyro_unit}]": True,
+        (warmth := "temperature [°C]"): bool(run.temperature_columns),
+        (change := "change [°C/min]"): bool(rates),
+        (table := "table [deg/s]"): bool(np.any(run.rate)),
+    }
+    rows = [title for title, there in shown.items() if there]
     per_unit, unit = time_unit(run.span_s)
+    figure = style.stacked({**dict.fromkeys(rows, 1.2), rows[0]: 1.6}, f"time [{unit}]", 0.035)
     time = large.each(lambda seconds: seconds / per_unit, run.time)
     _output(figure, run, time, per_unit)
     for index, name in enumerate(run.temperature_columns):
-        place = rows.index("temperature") + 1
+        looks = style.SERIES[index % 7], 1.6, style.DASHES[index % 7]
         x, y = drawn(time, run.temperature(name), gaps=run.gap_starts)
-        _line(figure, place, x, y, name, index)
+        trace = style.line(x, y, name, *looks, legendgroup=name, showlegend=True)
+        figure.add_trace(trace, rows.index(warmth) + 1, 1)
         if name in rates:
             rate_time, rate, gaps = rates[name]
             x, y = drawn(rate_time / per_unit, rate, gaps=gaps)
-            _line(figure, rows.index("change") + 1, x, y, name, index, legend=False)
-    if "rate" in rows:
+            trace = style.line(x, y, name, *looks, legendgroup=name, showlegend=False)
+            figure.add_trace(trace, rows.index(change) + 1, 1)
+    if table in rows:
         x, y = drawn(time, run.rate, gaps=run.gap_starts)
-        line = {"color": style.BLACK, "width": 1.2}
-        trace = go.Scatter(x=x, y=y, mode="lines", name="table rate", line=line, showlegend=False)
-        figure.add_trace(trace, row=rows.index("rate") + 1, col=1)
-    titles = {
-        "gyro": f"gyro [{run.gyro_unit}]",
-        "temperature": "temperature [°C]",
-        "change": "change [°C/min]",
-        "rate": "table [deg/s]",
-    }
-    for place, name in enumerate(rows, start=1):
-        figure.update_yaxes(title_text=titles[name], row=place, col=1)
-    figure.update_xaxes(title_text=f"time [{unit}]", row=len(rows), col=1)
+        trace = style.line(x, y, "table rate", style.BLACK, 1.2, showlegend=False)
+        figure.add_trace(trace, rows.index(table) + 1, 1)
     named = shade(figure, regime_segments(run, per_unit))
     style.styled(figure, 120 + 165 * len(rows), hovermode="x", legend={"y": 1.06})
     words = ", ".join(regime_word(name) for name in named) or "none"
@@ -243,24 +238,14 @@ def recording(run: Run) -> Drawing:
 
 def _output(figure: go.Figure, run: Run, time: FloatArray, per_unit: float) -> None:
     x, y = drawn(time, run.gyro, gaps=run.gap_starts)
-    line = {"color": style.TRAINING, "width": 0.8}
-    figure.add_scatter(x=x, y=y, mode="lines", name="output, all samples", line=line, row=1, col=1)
+    figure.add_trace(style.line(x, y, "output, all samples", style.TRAINING, 0.8), 1, 1)
     window_s = rounded_up(max(run.span_s / _AVERAGES, 20.0 * run.sample_s, 1e-6))
     means = block_averages(run.time, run.gyro, window_s=window_s) if run.span_s > 4.0 * window_s else None
     if means is not None and len(means) > 2:
         gaps = np.flatnonzero(np.diff(means.time_s) > _BRIDGED * window_s) + 1
         x, y = drawn(means.time_s / per_unit, means.values[0], gaps=gaps)
-        line = {"color": style.BEFORE, "width": 1.6}
         name = f"output, {number(window_s)} s averages"
-        figure.add_scatter(x=x, y=y, mode="lines", name=name, line=line, row=1, col=1)
-
-
-def _line(
-    figure: go.Figure, row: int, x: FloatArray, y: FloatArray, name: str, index: int, legend: bool = True
-) -> None:
-    line = {"color": style.SERIES[index % 7], "dash": style.DASHES[index % 7], "width": 1.6}
-    trace = go.Scatter(x=x, y=y, mode="lines", name=name, line=line, legendgroup=name, showlegend=legend)
-    figure.add_trace(trace, row=row, col=1)
+        figure.add_trace(style.line(x, y, name, style.BEFORE, 1.6), 1, 1)
 
 
 def _rate_window(run: Run) -> float:

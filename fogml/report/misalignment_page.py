@@ -143,7 +143,8 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def slopes_over_tilts(values: Mapping[str, Any]) -> Drawing:
     """Slopes with the fitted curves above, what is left of them below."""
-    figure = style.stacked([0.62, 0.38], 0.08)
+    panels = {f"slope [{values['unit']}]": 0.62, "left over [ppm of K]": 0.38}
+    figure = style.stacked(panels, "tilt of the fixture [deg]", 0.08)
     largest = max(abs(s) for state in values["states"] for s in state["slopes"])
     left = 0.0
     for index, state in enumerate(values["states"]):
@@ -151,21 +152,13 @@ def slopes_over_tilts(values: Mapping[str, Any]) -> Drawing:
         fine = np.linspace(tilts.min(), tilts.max(), 91)
         terms = [np.cos(np.radians(fine)), np.sin(np.radians(fine)), np.ones_like(fine)]
         curve = sum(c * term for c, term in zip(state["coefficients"], terms))
-        colour, name = style.SERIES[index], f"state {state['state']}"
-        line = {"color": colour, "dash": style.DASHES[index], "width": 1.6}
-        marker = {"symbol": style.MARKERS[index], "size": 9, "color": colour}
-        figure.add_scatter(
-            x=fine, y=curve, mode="lines", line=line, showlegend=False, hoverinfo="skip", row=1, col=1
-        )
-        figure.add_scatter(x=tilts, y=state["slopes"], mode="markers", name=name, marker=marker, row=1, col=1)
         residuals = 1e6 * np.asarray(state["residuals"]) / values["K"]
         left = max(left, float(np.abs(residuals).max()))
-        figure.add_scatter(
-            x=tilts, y=residuals, mode="markers", marker=marker, showlegend=False, row=2, col=1
-        )
-    figure.update_yaxes(title_text=f"slope [{values['unit']}]", row=1, col=1)
-    figure.update_yaxes(title_text="left over [ppm of K]", row=2, col=1)
-    figure.update_xaxes(title_text="tilt of the fixture [deg]", row=2, col=1)
+        looks = style.SERIES[index], style.MARKERS[index]
+        fitted = style.SERIES[index], 1.6, style.DASHES[index]
+        figure.add_trace(style.line(fine, curve, None, *fitted, showlegend=False, hoverinfo="skip"), 1, 1)
+        figure.add_trace(style.points(tilts, state["slopes"], f"state {state['state']}", *looks), 1, 1)
+        figure.add_trace(style.points(tilts, residuals, None, *looks, showlegend=False), 2, 1)
     style.styled(figure, 560)
     return Drawing(
         figure,
@@ -184,22 +177,11 @@ def region_figure(values: Mapping[str, Any]) -> Drawing | None:
         return None
     outline = np.asarray(region["outline_deg"])
     figure = go.Figure()
-    figure.add_scatter(
-        x=outline[:, 0],
-        y=outline[:, 1],
-        mode="lines",
-        fill="toself",
-        fillcolor="rgba(0, 114, 178, 0.18)",
-        line={"color": style.BLUE, "width": 1.4},
-        name=f"{percent(region['level'], 0)} region",
-    )
-    figure.add_scatter(
-        x=[values["delta_x_deg"]],
-        y=[values["delta_y_deg"]],
-        mode="markers",
-        name="four states",
-        marker={"symbol": "cross", "size": 11, "color": style.BLUE},
-    )
+    filled = {"fill": "toself", "fillcolor": "rgba(0, 114, 178, 0.18)"}
+    words = f"{percent(region['level'], 0)} region"
+    figure.add_trace(style.line(outline[:, 0], outline[:, 1], words, style.BLUE, 1.4, **filled))
+    there = [values["delta_x_deg"]], [values["delta_y_deg"]]
+    figure.add_trace(style.points(*there, "four states", style.BLUE, "cross", 11))
     figure.update_xaxes(title_text="misalignment x [deg]", tickformat=".6~g", nticks=5)
     figure.update_yaxes(title_text="misalignment y [deg]", tickformat=".6~g")
     style.styled(figure, 420)

@@ -110,21 +110,19 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
     """Every figure over the unit's age, with the changes and the runs that they were noticed with."""
     told = [name for name in FIGURE_WORDS if any(run[name] is not None for run in unit["runs"])]
     told = told or ["level"]
-    figure = style.stacked([1.0] * len(told), 0.16 / len(told))
-    age = unit["age"]
+    titles = [f"{FIGURE_WORDS[n].replace('slope against the', 'slope,')}<br>[{_UNITS[n]}]" for n in told]
+    axis, age = _age_axis(unit), unit["age"]
+    looks = {"title_font_size": 11, "tickformat": ".3~g"}
+    figure = style.stacked(dict.fromkeys(titles, 1.0), axis["title_text"], 0.16 / len(told), **looks)
+    figure.update_xaxes(**axis, row=len(told), col=1)
     for row, name in enumerate(told, start=1):
         values = [shown_figure(run, name) for run in unit["runs"]]
+        bars = _bars(unit["runs"], name) | {"color": style.TRAINING, "thickness": 1, "width": 2}
         figure.add_scatter(
             x=age,
             y=values,
             mode="lines+markers",
-            error_y={
-                "type": "data",
-                **_bars(unit["runs"], name),
-                "color": style.TRAINING,
-                "thickness": 1,
-                "width": 2,
-            },
+            error_y=bars,
             line={"color": style.TRAINING, "width": 1},
             marker={"size": 7, "color": style.BLUE},
             customdata=[run["run"] for run in unit["runs"]],
@@ -133,37 +131,20 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
             row=row,
             col=1,
         )
-        figure.update_yaxes(
-            title_text=f"{FIGURE_WORDS[name].replace('slope against the', 'slope,')}<br>[{_UNITS[name]}]",
-            title_font_size=11,
-            tickformat=".3~g",
-            row=row,
-            col=1,
-        )
         if name == "scatter":
             seen = [value for value in values if value is not None]
             figure.update_yaxes(**log_axis(min(seen), max(seen)), row=row, col=1)
         if name == "level":
-            half = unit["runs"][-1]["half_width"]
-            for end in (-half, half):
-                figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=1)
+            style.floor_lines(figure, unit["runs"][-1]["half_width"], row)
         for alarm in unit["alarms"]:
             if alarm["figure"] == name:
                 figure.add_vline(
                     x=alarm["onset_age"], line={"color": style.VERMILION, "width": 2}, row=row, col=1
                 )
                 raised = alarm["raised_at_index"]
-                figure.add_scatter(
-                    x=[age[raised]],
-                    y=[values[raised]],
-                    mode="markers",
-                    marker=style.ring(16),
-                    showlegend=False,
-                    hoverinfo="skip",
-                    row=row,
-                    col=1,
+                figure.add_trace(
+                    style.ring([age[raised]], [values[raised]], None, 16, **style.SILENT), row, 1
                 )
-    figure.update_xaxes(**_age_axis(unit), row=len(told), col=1)
     style.styled(figure, 90 + 150 * len(told))
     changes = "; ".join(f"{FIGURE_WORDS[a['figure']]} since {onset_words(a)}" for a in unit["alarms"])
     return Drawing(
@@ -189,7 +170,7 @@ def _bars(runs: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:
         else:
             beyond.append(half)
             below.append(half)
-    return {"symmetric": False, "array": beyond, "arrayminus": below}
+    return {"type": "data", "symmetric": False, "array": beyond, "arrayminus": below}
 
 
 def shown_figure(run: Mapping[str, Any], name: str) -> float | None:
@@ -201,24 +182,12 @@ def shown_figure(run: Mapping[str, Any], name: str) -> float | None:
 def evidence(unit: Mapping[str, Any], limit: float) -> Drawing:
     """The evidence of change after each run, against the limit."""
     values = [max(value, 1e-2) for value in unit["statistic"]]
-    figure = go.Figure(
-        go.Scatter(
-            x=unit["age"],
-            y=values,
-            mode="lines+markers",
-            name="evidence of change",
-            line={"color": style.BLUE},
-            marker={"size": 6},
-        )
+    curve = style.line(
+        unit["age"], values, "evidence of change", style.BLUE, 2, mode="lines+markers", marker={"size": 6}
     )
-    figure.add_hline(y=limit, line={"color": style.VERMILION, "dash": "dash", "width": 1.5})
-    figure.add_scatter(
-        x=[None],
-        y=[None],
-        mode="lines",
-        name="limit",
-        line={"color": style.VERMILION, "dash": "dash", "width": 1.5},
-    )
+    limited = style.line([None], [None], "limit", style.VERMILION, 1.5, "dash")
+    figure = go.Figure([curve, limited])
+    figure.add_hline(y=limit, line=limited.line.to_plotly_json())
     figure.update_yaxes(title_text="evidence, logarithmic", **log_axis(min(values), max(*values, 2 * limit)))
     figure.update_xaxes(**_age_axis(unit))
     style.styled(figure, 300)
@@ -241,20 +210,11 @@ def levels(units: Sequence[Mapping[str, Any]]) -> Drawing:
         if not some:
             continue
         last = [units[i]["runs"][-1] for i in some]
-        figure.add_scatter(
-            x=[labels[i] for i in some],
-            y=[run["level"] for run in last],
-            mode="markers",
-            name="changed" if state == "alarm" else "not changed",
-            marker={"symbol": symbol, "size": 10, "color": colour},
-            error_y={
-                "type": "data",
-                "array": [run["half_width"] for run in last],
-                "thickness": 1,
-                "width": 2,
-                "color": style.TRAINING,
-            },
-        )
+        x, y = [labels[i] for i in some], [run["level"] for run in last]
+        name = "changed" if state == "alarm" else "not changed"
+        bars = {"type": "data", "array": [run["half_width"] for run in last]}
+        looks = {"thickness": 1, "width": 2, "color": style.TRAINING}
+        figure.add_trace(style.points(x, y, name, colour, symbol, 10, error_y={**bars, **looks}))
     serial_axis(figure, labels)
     figure.update_yaxes(title_text="bias left by the model [deg/h]", tickformat=".3~g")
     style.styled(figure, 380)

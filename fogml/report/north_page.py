@@ -189,28 +189,13 @@ def error_by_azimuth(values: Mapping[str, Any]) -> Drawing | None:
     if not circle:
         return None
     azimuth, error = np.asarray(circle["azimuth_deg"]), np.asarray(circle["error_deg"])
-    figure = go.Figure()
-    figure.add_scatter(
-        x=azimuth, y=error, mode="lines", name="plain seek", line={"color": style.BLUE, "width": 2}
-    )
+    figure = go.Figure(style.line(azimuth, error, "plain seek", style.BLUE, 2))
     quiet = values["quiet_azimuth_deg"] if values.get("way", "plain") == "plain" else []
     if quiet:
-        figure.add_scatter(
-            x=quiet,
-            y=[0.0] * len(quiet),
-            mode="markers",
-            name="quiet azimuth",
-            marker={"symbol": "circle", "size": 11, "color": style.GREEN},
-        )
+        figure.add_trace(style.points(quiet, [0.0] * len(quiet), "quiet azimuth", style.GREEN, size=11))
     here = values.get("true_azimuth_deg", values["azimuth_deg"])
     at = float(np.interp(here, azimuth, error, period=360.0))
-    figure.add_scatter(
-        x=[here],
-        y=[at],
-        mode="markers",
-        name="this seek",
-        marker={"symbol": "diamond-open", "size": 12, "color": style.VERMILION, "line": {"width": 2}},
-    )
+    figure.add_trace(style.points([here], [at], "this seek", style.VERMILION, "diamond-open", 12, 2))
     figure.update_xaxes(title_text="azimuth [deg clockwise from north]", range=[0, 360], dtick=45)
     figure.update_yaxes(title_text="error of the azimuth [deg]", tickformat=".3~g")
     style.styled(figure, 400)

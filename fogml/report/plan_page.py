@@ -26,46 +26,36 @@ def programme_drawing(run: Mapping[str, Any]) -> Drawing:
     profile = run["profile"]
     turned = any(profile["table_rate"]["value"])
     switched = [what for what in (*_SWITCHES, "yaw") if what in profile]
-    rows = ["temperature", *(["table"] if turned else []), *(["switches"] if switched else [])]
-    figure = style.stacked([2.0, *[1.0] * (len(rows) - 1)], 0.05)
+    panels = {"temperature [°C]": 2.0}
+    panels |= ({"table [deg/s]": 1.0} if turned else {}) | ({"": 1.0} if switched else {})
     total_s = 3600.0 * run["hours"]
     per_unit, unit = time_unit(total_s)
-    set_point, coil = profile["set_point"], profile["coil"]
-    _line(figure, 1, set_point, per_unit, "set point", style.BLUE, "solid")
-    _line(figure, 1, coil, per_unit, "coil, expected", style.VERMILION, "dot")
-    figure.update_yaxes(title_text="temperature [°C]", row=1, col=1)
-    if turned:
-        place = rows.index("table") + 1
-        # Rates span five decades of either sign: a symmetrical logarithm shows them all.
-        signed = {
-            "time_s": profile["table_rate"]["time_s"],
-            "value": [_symmetrical(rate) for rate in profile["table_rate"]["value"]],
-        }
-        _line(figure, place, signed, per_unit, "table rate", style.BLACK, "solid", legend=False)
-        ticks = (-100.0, -1.0, -0.01, 0.0, 0.01, 1.0, 100.0)
-        figure.update_yaxes(
-            title_text="table [deg/s]",
-            tickmode="array",
-            tickvals=[_symmetrical(rate) for rate in ticks],
-            ticktext=[f"{rate:g}".replace("-", "−") for rate in ticks],
-            row=place,
-            col=1,
-        )
-    if switched:
-        place = rows.index("switches") + 1
-        for level, what in enumerate(switched):
-            _bar(figure, place, profile[what], what, level, total_s, per_unit)
-        figure.update_yaxes(
-            tickmode="array",
-            tickvals=list(range(len(switched))),
-            ticktext=[_named(what) for what in switched],
-            range=[-0.6, len(switched) - 0.4],
-            row=place,
-            col=1,
-        )
+    figure, last = style.stacked(panels, f"time [{unit}]", 0.05), len(panels)
     figure.update_xaxes(range=[0.0, total_s / per_unit])
-    figure.update_xaxes(title_text=f"time [{unit}]", row=len(rows), col=1)
-    style.styled(figure, 200 + 150 * len(rows), legend={"y": 1.03})
+
+    def course(name: str) -> tuple[list[float], list[float]]:
+        return [time / per_unit for time in profile[name]["time_s"]], profile[name]["value"]
+
+    set_point = profile["set_point"]
+    for name, words, colour, dash in (
+        ("set_point", "set point", style.BLUE, "solid"),
+        ("coil", "coil, expected", style.VERMILION, "dot"),
+    ):
+        figure.add_trace(style.line(*course(name), words, colour, 1.8, dash, showlegend=True), 1, 1)
+    if turned:
+        # Rates span five decades of either sign: a symmetrical logarithm shows them all.
+        x, rates = course("table_rate")
+        signed = [_symmetrical(rate) for rate in rates]
+        figure.add_trace(style.line(x, signed, "table rate", style.BLACK, 1.8, showlegend=False), 2, 1)
+        ticks = (-100.0, -1.0, -0.01, 0.0, 0.01, 1.0, 100.0)
+        told = {rate: f"{rate:g}".replace("-", "−") for rate in ticks}
+        _write_ticks(figure, 2, {_symmetrical(rate): text for rate, text in told.items()})
+    if switched:
+        for level, what in enumerate(switched):
+            figure.add_trace(_bar(profile[what], what, level, total_s, per_unit), last, 1)
+        _write_ticks(figure, last, {level: _named(what) for level, what in enumerate(switched)})
+        figure.update_yaxes(range=[-0.6, len(switched) - 0.4], row=last, col=1)
+    style.styled(figure, 200 + 150 * last, legend={"y": 1.03})
     low, high = min(set_point["value"]), max(set_point["value"])
     done = [_named(what) for what in switched]
     return Drawing(
@@ -87,15 +77,9 @@ def errors_drawing(values: Mapping[str, Any]) -> Drawing | None:
     if not shares:
         return None
     names, sizes = [name for name, _ in shares], [share for _, share in shares]
-    figure = go.Figure(
-        go.Scatter(
-            x=sizes,
-            y=names,
-            mode="markers",
-            marker={"symbol": "diamond", "size": 11, "color": style.BLUE},
-            hovertemplate="%{y}: %{short(x)}<extra></extra>",
-        )
-    )
+    shown = "%{y}: %{short(x)}<extra></extra>"
+    trace = style.points(sizes, names, None, style.BLUE, "diamond", 11, hovertemplate=shown)
+    figure = go.Figure(trace)
     figure.add_vline(x=1.0, line=style.FLOOR_LINE)
     figure.update_xaxes(
         title_text="expected standard error / prior or usual size",
@@ -124,36 +108,12 @@ def _named(what: str) -> str:
     return {"power": "power on", "fan": "fan on", "compressor": "compressor off", "yaw": "yawed"}[what]
 
 
-def _line(
-    figure: go.Figure,
-    row: int,
-    series: Mapping[str, Any],
-    per_unit: float,
-    name: str,
-    colour: str,
-    dash: str,
-    legend: bool = True,
-) -> None:
-    trace = go.Scatter(
-        x=[time / per_unit for time in series["time_s"]],
-        y=series["value"],
-        mode="lines",
-        name=name,
-        line={"color": colour, "dash": dash, "width": 1.8},
-        showlegend=legend,
-    )
-    figure.add_trace(trace, row=row, col=1)
+def _write_ticks(figure: go.Figure, row: int, texts: Mapping[float, str]) -> None:
+    ticks = {"tickmode": "array", "tickvals": list(texts), "ticktext": list(texts.values())}
+    figure.update_yaxes(**ticks, row=row, col=1)
 
 
-def _bar(
-    figure: go.Figure,
-    row: int,
-    series: Mapping[str, Any],
-    what: str,
-    level: int,
-    total_s: float,
-    per_unit: float,
-) -> None:
+def _bar(series: Mapping[str, Any], what: str, level: int, total_s: float, per_unit: float) -> go.Scatter:
     """Stretches in which a switch is on, the compressor off, or the fixture turned."""
     times = [*series["time_s"], total_s]
     xs: list[float | None] = []
@@ -161,15 +121,8 @@ def _bar(
         shown = value == 0.0 if what == "compressor" else bool(value)
         if shown and stop > start:
             xs += [start / per_unit, stop / per_unit, None]
-    trace = go.Scatter(
-        x=xs,
-        y=[None if x is None else level for x in xs],
-        mode="lines",
-        line={"color": style.SERIES[level], "width": 9},
-        name=_named(what),
-        showlegend=False,
-    )
-    figure.add_trace(trace, row=row, col=1)
+    ys = [None if x is None else level for x in xs]
+    return style.line(xs, ys, _named(what), style.SERIES[level], 9, showlegend=False)
 
 
 def plan_page(values: Mapping[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,6 +59,8 @@ REGIME_WORDS = {
 }
 
 FLOOR_LINE = {"color": FLOOR, "width": 1.2, "dash": "dash"}
+SILENT: dict[str, Any] = {"showlegend": False, "hoverinfo": "skip"}
+"""Of a trace that neither the legend nor the pointer names."""
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', Arial, sans-serif"
 _INK = "#1F2328"
@@ -111,23 +113,73 @@ def floor_in_legend() -> go.Scatter:
     return go.Scatter(x=[None], y=[None], mode="lines", name="noise floor", line=FLOOR_LINE)
 
 
-def ring(size: int) -> dict[str, Any]:
-    """The marker that sets one point off from others, of so many px."""
-    return {"symbol": "circle-open", "size": size, "color": VERMILION, "line": {"width": 2.5}}
+def line(
+    x: Any, y: Any, name: str | None, colour: str, width: float, dash: str | None = None, **more: Any
+) -> go.Scatter:
+    """A curve of so many px; `more` properties of a trace as plotly has them."""
+    looks = {"color": colour, "width": width, "dash": dash}
+    return go.Scatter(x=x, y=y, name=name, line=looks, **{"mode": "lines", **more})
 
 
-def error_bars(middle: Sequence[float], ends: Sequence[Sequence[float]], **looks: Any) -> dict[str, Any]:
+def band(x: Any, y: Any, name: str, tint: str) -> go.Scatter:
+    """What lies within an outline, tinted."""
+    return line(x, y, name, tint, 0, fill="toself", fillcolor=tint, hoverinfo="skip")
+
+
+def points(
+    x: Any,
+    y: Any,
+    name: str | None,
+    colour: str,
+    symbol: str = "circle",
+    size: float = 9,
+    edge: float | None = None,
+    **more: Any,
+) -> go.Scatter:
+    """Markers of so many px, with an edge of so many; `more` properties of a trace as plotly has them."""
+    looks = {"color": colour, "symbol": symbol, "size": size, "line": edge and {"width": edge}}
+    return go.Scatter(x=x, y=y, name=name, marker=looks, **{"mode": "markers", **more})
+
+
+def grouped(name: str, shown: bool) -> dict[str, Any]:
+    """Of a trace in several panels: it stands in the legend once, where it is shown there."""
+    return {"legendgroup": name, "showlegend": shown}
+
+
+def floor_lines(figure: go.Figure, floor: float, row: int, column: int = 1) -> None:
+    """Draw the noise floor on either side of zero into a panel."""
+    for value in (floor, -floor):
+        figure.add_hline(y=value, row=row, col=column, line=FLOOR_LINE)
+
+
+def ring(x: Any, y: Any, name: str | None, size: int, **more: Any) -> go.Scatter:
+    """What sets points off from others, of so many px."""
+    return points(x, y, name, VERMILION, "circle-open", size, 2.5, **more)
+
+
+def error_bars(
+    middle: Sequence[float | None], ends: Sequence[Sequence[float | None]], **looks: Any
+) -> dict[str, Any]:
     """Bars from the lower to the upper end of each interval about its middle; `looks` as plotly has them."""
-    reach = [(max(m - low, 0.0), max(high - m, 0.0)) for m, (low, high) in zip(middle, ends, strict=True)]
-    below, above = zip(*reach, strict=True) if reach else ((), ())
+
+    def arm(low: float | None, high: float | None) -> float:
+        return 0.0 if low is None or high is None else max(high - low, 0.0)
+
+    below = [arm(low, value) for value, (low, _) in zip(middle, ends, strict=True)]
+    above = [arm(value, high) for value, (_, high) in zip(middle, ends, strict=True)]
     return {"type": "data", "symmetric": False, "array": above, "arrayminus": below, **looks}
 
 
-def stacked(heights: Sequence[float], spacing: float) -> go.Figure:
-    """A figure of panels one below the other over the same axis, by their heights to each other."""
-    return make_subplots(
-        rows=len(heights), cols=1, shared_xaxes=True, vertical_spacing=spacing, row_heights=list(heights)
-    )
+def stacked(panels: Mapping[str, float], across: str, spacing: float, **looks: Any) -> go.Figure:
+    """A figure of panels one below the other over the same axis.
+
+    Panels by their titles, with their heights to each other; `looks` of the titles' axes as plotly has them.
+    """
+    heights = list(panels.values())
+    figure = make_subplots(len(panels), 1, shared_xaxes=True, vertical_spacing=spacing, row_heights=heights)
+    for row, title in enumerate(panels, start=1):
+        figure.update_yaxes(title_text=title, row=row, col=1, **looks)
+    return figure.update_xaxes(title_text=across, row=len(panels), col=1)
 
 
 def styled(figure: go.Figure, height: int, **layout: Any) -> go.Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -31,37 +31,17 @@ def history(study: Mapping[str, Any]) -> Drawing:
     figure = go.Figure()
     for place, model in enumerate(sorted({trial["model"] for trial in whole})):
         own = [trial for trial in whole if trial["model"] == model]
-        marker = {
-            "symbol": style.MARKERS[place % len(style.MARKERS)],
-            "size": 8,
-            "color": style.SERIES[place % len(style.SERIES)],
-        }
-        figure.add_scatter(
-            x=[t["number"] for t in own],
-            y=[t["rms"] for t in own],
-            mode="markers",
-            name=model,
-            marker=marker,
-            text=[t["features"] for t in own],
-        )
+        x, y = [t["number"] for t in own], [t["rms"] for t in own]
+        looks = style.SERIES[place % 7], style.MARKERS[place % 7], 8
+        figure.add_trace(style.points(x, y, model, *looks, text=[t["features"] for t in own]))
     best = np.minimum.accumulate(errors)
-    figure.add_scatter(
-        x=numbers,
-        y=best,
-        mode="lines",
-        name="best so far",
-        line={"color": style.BLACK, "width": 1.5, "shape": "hv"},
-    )
+    figure.add_trace(style.line(numbers, best, "best so far", style.BLACK, 1.5, line_shape="hv"))
     low, high = float(errors.min()), float(errors.max())
     axis = log_axis(low, max(high, 1.02 * low), room=0.12)
     if pruned:
-        figure.add_scatter(
-            x=pruned,
-            y=[10.0 ** (axis["range"][0] + 0.03 * (axis["range"][1] - axis["range"][0]))] * len(pruned),
-            mode="markers",
-            name="pruned or refused",
-            marker={"symbol": "line-ns-open", "size": 9, "color": style.PURPLE},
-        )
+        low_end, high_end = axis["range"]
+        below = [10.0 ** (low_end + 0.03 * (high_end - low_end))] * len(pruned)
+        figure.add_trace(style.points(pruned, below, "pruned or refused", style.PURPLE, "line-ns-open"))
     figure.update_xaxes(title_text="trial")
     figure.update_yaxes(title_text="held-out rms [deg/h], logarithmic", **axis)
     style.styled(figure, 400)
@@ -118,36 +98,19 @@ def pareto_front(study: Mapping[str, Any]) -> Drawing:
     best = study["winner"]
     figure = make_subplots(rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.04)
     for column, (cost, title) in enumerate(_COSTS.items(), start=1):
-        shown = column == 1
-        _points(figure, trials, cost, column, shown)
-        figure.add_scatter(
-            x=[t[cost] for t in front],
-            y=[t["rms"] for t in front],
-            mode="markers",
-            name="in the Pareto set",
-            marker={"symbol": "diamond", "size": 10, "color": style.BLUE},
-            text=[f"{t['model']}: {t['features']}" for t in front],
-            showlegend=shown,
-            row=1,
-            col=column,
-        )
-        figure.add_scatter(
-            x=[best[cost]],
-            y=[best["rms"]],
-            mode="markers",
-            name="winner",
-            marker=style.ring(18),
-            showlegend=shown,
-            row=1,
-            col=column,
-        )
+        for name, some, colour, symbol, size in (
+            ("other trials", trials, style.TRAINING, "circle", 6),
+            ("in the Pareto set", front, style.BLUE, "diamond", 10),
+        ):
+            x, y = [max(t[cost], 1) for t in some], [t["rms"] for t in some]
+            told = [f"{t['model']}: {t['features']}" for t in some]
+            trace = style.points(x, y, name, colour, symbol, size, text=told, showlegend=column == 1)
+            figure.add_trace(trace, 1, column)
+        trace = style.ring([max(best[cost], 1)], [best["rms"]], "winner", 18, showlegend=column == 1)
+        figure.add_trace(trace, 1, column)
         values = [max(t[cost], 1) for t in trials]
-        figure.update_xaxes(
-            title_text=f"{title}, logarithmic",
-            **log_axis(min(values), max(*values, 1.2 * min(values)), room=0.1),
-            row=1,
-            col=column,
-        )
+        axis = log_axis(min(values), max(*values, 1.2 * min(values)), room=0.1)
+        figure.update_xaxes(title_text=f"{title}, logarithmic", **axis, row=1, col=column)
     errors = [trial["rms"] for trial in trials]
     axis = log_axis(min(errors), max(*errors, 1.02 * min(errors)), room=0.12)
     figure.update_yaxes(**axis)
@@ -161,22 +124,6 @@ def pareto_front(study: Mapping[str, Any]) -> Drawing:
             f"Pareto set: trials that no other is at least as good as in every objective ({named}). The "
             "winner is the default, or the best of those that beat it beyond noise."
         ),
-    )
-
-
-def _points(
-    figure: go.Figure, trials: Sequence[Mapping[str, Any]], cost: str, column: int, shown: bool
-) -> None:
-    figure.add_scatter(
-        x=[max(t[cost], 1) for t in trials],
-        y=[t["rms"] for t in trials],
-        mode="markers",
-        name="other trials",
-        marker={"symbol": "circle", "size": 6, "color": "#9AA1AA"},
-        text=[f"{t['model']}: {t['features']}" for t in trials],
-        showlegend=shown,
-        row=1,
-        col=column,
     )
 
 

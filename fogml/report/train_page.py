@@ -192,20 +192,15 @@ def navigation_sections(costs: Mapping[str, Any]) -> list[NavigationSection]:
 
 def navigation_figure(run: Mapping[str, Any], latitude_deg: float) -> Drawing:
     """Position and heading of a navigator at rest, driven by the drift before and after compensation."""
-    figure = style.stacked([1.0, 1.0], 0.08)
+    figure = style.stacked({"position error [km]": 1.0, "heading error [deg]": 1.0}, "time [h]", 0.08)
     hours = np.asarray(run["time_h"])
     last: dict[str, float] = {}
     for when, colour, dash in (("before", style.BEFORE, "dot"), ("after", style.AFTER, "solid")):
         told = run[when][SHOWN_AXIS]
-        line = {"color": colour, "width": 2, "dash": dash}
-        figure.add_scatter(x=hours, y=told["position_km"], mode="lines", name=when, line=line, row=1, col=1)
-        figure.add_scatter(
-            x=hours, y=told["heading_deg"], mode="lines", line=line, showlegend=False, row=2, col=1
-        )
+        looks = colour, 2, dash
+        figure.add_trace(style.line(hours, told["position_km"], when, *looks), 1, 1)
+        figure.add_trace(style.line(hours, told["heading_deg"], None, *looks, showlegend=False), 2, 1)
         last[when] = told["position_km"][-1]
-    figure.update_yaxes(title_text="position error [km]", row=1, col=1)
-    figure.update_yaxes(title_text="heading error [deg]", row=2, col=1)
-    figure.update_xaxes(title_text="time [h]", row=2, col=1)
     style.styled(figure, 480)
     return Drawing(
         figure,
