@@ -27,6 +27,7 @@ from fogml.models.feature_model import resolve_features
 from fogml.models.intervals import Intervals
 from fogml.models.trial import Trial
 from fogml.models.weighing import weigh
+from fogml.processes import one_thread
 from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
 
@@ -81,7 +82,8 @@ class AutoModel(DriftModel):
                 self.progress(done + 1, len(trial.candidates), candidate.name)
         self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
         self.choice_ = trial.chosen(scores)
-        self.weighed_ = weigh(group, self.choice_.candidate, features, self.seed, trial.one_rate)
+        with one_thread("blas"):
+            self.weighed_ = weigh(group, self.choice_.candidate, features, self.seed, trial.one_rate)
         self.chosen_ = self.weighed_.model
         notes = (*refusals(group), *self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)

@@ -180,6 +180,12 @@ def check_columns(run: str, columns: Mapping[str, FloatArray]) -> None:
         raise InputError(f"{run}, column 'time': {fault}")
 
 
+def check_forwards(run: str, part: slice | BoolArray) -> None:
+    """Refuse as a part of a run a sample, or samples in an order of one's own."""
+    if (part.step or 1) < 0 if isinstance(part, slice) else np.asarray(part).dtype != np.bool_:
+        raise InputError(f"{run}: a part is a slice forwards, as run[100:200], or a mask of the samples")
+
+
 REPAIR = "--repair"
 
 

@@ -21,7 +21,7 @@ from fogml.runs.dropouts import RULE, DropoutRule, Reading, last_reading, read_t
 from fogml.runs.exchange import Exchange
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding, first_of_all
-from fogml.runs.possible import as_vector, check_columns
+from fogml.runs.possible import as_vector, check_columns, check_forwards
 from fogml.signals import large
 from fogml.signals.clock import Clock, gap_starts
 
@@ -98,9 +98,7 @@ class Run(Exchange):
     ) -> Run:
         """A run of columns that were checked before, such as a part of a run."""
         run = object.__new__(cls)
-        values = {"name": name, "facts": facts or Facts(), "gyro_unit": gyro_unit, "findings": findings}
-        for key, value in values.items():
-            object.__setattr__(run, key, value)
+        run.__dict__.update(name=name, facts=facts or Facts(), gyro_unit=gyro_unit, findings=findings)
         run._freeze(columns)
         return run
 
@@ -303,8 +301,9 @@ class Run(Exchange):
                 digest.update(np.ascontiguousarray(values[part]).data)
         return digest.hexdigest()
 
-    def __getitem__(self, part: slice) -> Run:
-        """A part of the run as views, e.g. ``run[100:200]``."""
+    def __getitem__(self, part: slice | BoolArray) -> Run:
+        """A part of the run in its order: views by a slice, ``run[100:200]``, copies by a mask."""
+        check_forwards(self.name, part)
         return self._with({name: values[part] for name, values in self.columns.items()})
 
     def with_columns(self, **columns: ArrayLike) -> Run:

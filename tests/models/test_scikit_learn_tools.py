@@ -8,6 +8,7 @@ import pytest
 import sklearn
 from sklearn.base import is_regressor
 from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut, cross_validate
+from threadpoolctl import threadpool_limits
 
 from fogml.errors import InputError
 from fogml.models.linear import LinearRegressor
@@ -41,6 +42,15 @@ def test_a_grid_search_over_runs_finds_the_form() -> None:
     search = GridSearchCV(make_model("polynomial"), {"features": ["T", "T^1..2"]}, cv=KFold(2)).fit(runs)
     assert search.best_params_ == {"features": "T^1..2"}
     assert search.best_estimator_.score(run(9)) > 0.9
+
+
+@pytest.mark.parametrize("name", ["auto", "mixed-effects", "polynomial"])
+def test_threads_do_not_change_a_bit(name: str) -> None:
+    told = []
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            told.append(make_model(name).fit([run(0), run(1)]).predict(run(2)))
+    assert np.array_equal(*told)
 
 
 def test_runs_of_a_group_stay_together() -> None:

@@ -95,6 +95,14 @@ def test_a_run_keeps_what_it_was_given() -> None:
     assert [float(run.gyro[1]) for run in made] == [np.sin(1.0)] * 3
 
 
+def test_a_part_of_a_run_goes_forwards_in_time() -> None:
+    whole = run()
+    assert np.array_equal(whole[whole.time > 99.5].time, whole[100:].time)
+    for part in (slice(None, None, -1), 5, [3, 2, 1], np.array([1, 2])):
+        with pytest.raises(InputError, match=r"run\[100:200\]"):
+            whole[part]  # type: ignore[index]
+
+
 @pytest.mark.parametrize(
     ("columns", "told"),
     [
