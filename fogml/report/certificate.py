@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import date as Date
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -39,26 +40,6 @@ _MOST_RUNS = 8
 _MOST_FEATURES = 3
 
 
-@dataclass(frozen=True)
-class Sheet:
-    """What one certificate shows."""
-
-    unit: str
-    axis: str
-    met: bool
-    unseen: bool
-    limits: list[LimitOutcome]
-    about: list[tuple[str, str]]
-    runs: Table
-    figures: Table
-    worst: str
-    synthetic: bool
-    more_runs: int
-    figure: Markup
-    figure_words: str
-    notes: list[str]
-
-
 def certificate(judgements: Judgement | Sequence[Judgement], date: Date | str | None = None) -> str:
     """The certificates of one or several judgements as one HTML page, one A4 sheet per unit.
 
@@ -73,7 +54,7 @@ def certificate(judgements: Judgement | Sequence[Judgement], date: Date | str | 
     sheets = [_sheet(part) for judgement in judgements for part in by_unit(judgement)]
     return render(
         "certificate.html",
-        title=f"Certificate – {listed([sheet.unit for sheet in sheets])}",
+        title=f"Certificate – {listed([sheet['unit'] for sheet in sheets])}",
         sheets=sheets,
         date=date.isoformat() if isinstance(date, Date) else date or "",
         unit_of=unit_of,
@@ -109,14 +90,15 @@ def _again(stated: LimitOutcome, runs: Sequence[RunJudgement]) -> LimitOutcome:
         return replace(stated, value=math.nan, met=False)
 
 
-def _sheet(judgement: Judgement) -> Sheet:
+def _sheet(judgement: Judgement) -> dict[str, Any]:
+    """What one certificate shows."""
     worst = worst_run(judgement.test)
     shown = sorted(judgement.test, key=lambda run: -run.after.rms)[:_MOST_RUNS]
     figure, words = _figure(worst)
     card = dict(model_card(judgement.model, _MOST_FEATURES))
     about = [
         ("Model", f"{card['kind']}" + (f" of {card['features']}" if "features" in card else "")),
-        ("Size", ", ".join(card_line(card))),
+        ("Size", ", ".join(_size(card))),
         ("Verdict", advice_words(advice_on(judgement))["words"]),
         *([("Trained within", card["trained within"])] if "trained within" in card else []),
         ("Trained on", listed([run.run for run in judgement.train], 6)),
@@ -126,22 +108,22 @@ def _sheet(judgement: Judgement) -> Sheet:
         ("Averages", f"{short(worst.averaging_s, 4)} s"),
         ("Bias relative to", reference_of(worst)),
     ]
-    return Sheet(
-        unit=worst.unit or _NOT_STATED,
-        axis=worst.axis or _NOT_STATED,
-        met=judgement.met,
-        unseen=unseen(judgement),
-        limits=stated_limits(judgement),
-        about=about,
-        runs=_runs(shown),
-        figures=_figures(worst),
-        worst=worst.run,
-        synthetic=any(run.facts.synthetic for run in (*judgement.train, *judgement.test)),
-        more_runs=len(judgement.test) - len(shown),
-        figure=figure,
-        figure_words=words,
-        notes=[str(note) for note in judgement.notes][:3],
-    )
+    return {
+        "unit": worst.unit or _NOT_STATED,
+        "axis": worst.axis or _NOT_STATED,
+        "met": judgement.met,
+        "unseen": unseen(judgement),
+        "limits": stated_limits(judgement),
+        "about": about,
+        "runs": _runs(shown),
+        "figures": _figures(worst),
+        "worst": worst.run,
+        "synthetic": any(run.facts.synthetic for run in (*judgement.train, *judgement.test)),
+        "more_runs": len(judgement.test) - len(shown),
+        "figure": figure,
+        "figure_words": words,
+        "notes": [str(note) for note in judgement.notes][:3],
+    }
 
 
 def _runs(runs: Sequence[RunJudgement]) -> Table:
@@ -228,7 +210,7 @@ def signed(value: float) -> str:
     return short(value, 4).replace("-", "\N{MINUS SIGN}")
 
 
-def card_line(card: dict[str, str]) -> list[str]:
+def _size(card: dict[str, str]) -> list[str]:
     """Parameters and weights in words, as far as the model tells them."""
     line = [f"{card['parameters']} parameters"] if "parameters" in card else []
     return line + ([f"{card['weights']} of weights"] if "weights" in card else [])

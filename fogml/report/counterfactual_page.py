@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,21 +20,6 @@ from fogml.report.page import Drawing, render, template_text
 MOST_FACTOR = 3.0
 """Sliders go up to this many times the size found, or usual."""
 STEP = 0.05
-
-
-@dataclass(frozen=True)
-class Slider:
-    """One effect's slider: its name, the size that 1 stands for, where it begins and ends."""
-
-    number: int
-    effect: str
-    title: str
-    size: float
-    unit: str
-    start: float
-    low: float
-    high: float = MOST_FACTOR
-    step: float = STEP
 
 
 def counterfactual_page(found: Diagnosis) -> str:
@@ -55,8 +39,8 @@ def counterfactual_page(found: Diagnosis) -> str:
         name=subject_of(found),
         kicker=f"The twin “{found.model}” against recordings, with effects of any size",
         runs=[f"{run.run} ({'held out' if run.held_out else 'fitted on'})" for run in runs],
-        acting=[s for s in sliders if s.start],
-        others=[s for s in sliders if not s.start],
+        acting=[s for s in sliders if s["start"]],
+        others=[s for s in sliders if not s["start"]],
         drawing=_drawing(runs[0]),
         data=script_data(json.dumps(data)),
         averages=averages(runs[0].averaging_s).capitalize(),
@@ -64,24 +48,28 @@ def counterfactual_page(found: Diagnosis) -> str:
     )
 
 
-def _sliders(found: Diagnosis, runs: Sequence[Counterfactual]) -> list[Slider]:
-    """Of every effect that some run shows: those that act first, then those that hold most of the gap."""
-    names, told = titles(found), dict[str, Slider]()
-    gain = {row.effect: -row.gain for row in found.evidence}
+def _sliders(found: Diagnosis, runs: Sequence[Counterfactual]) -> list[dict[str, Any]]:
+    """Of every effect that some run shows: those that act first, then those that hold most of the gap.
+
+    Each with its name, the size that 1 stands for, where it begins and ends.
+    """
+    names, gain = titles(found), {row.effect: -row.gain for row in found.evidence}
     courses = {course.effect: course for run in runs for course in run.courses}
     order = sorted(courses.values(), key=lambda c: (not c.acts, gain.get(c.effect, 0.0)))
-    for number, course in enumerate(order):
-        low = -MOST_FACTOR if course.signed else 0.0
-        told[course.effect] = Slider(
-            number,
-            course.effect,
-            title_of(course.effect, names),
-            course.size,
-            "" if course.unit == "1" else unit_words(course.unit) or course.unit,
-            float(course.acts),
-            low,
-        )
-    return list(told.values())
+    return [
+        {
+            "number": number,
+            "effect": course.effect,
+            "title": title_of(course.effect, names),
+            "size": course.size,
+            "unit": unit_words(course.unit),
+            "start": float(course.acts),
+            "low": -MOST_FACTOR if course.signed else 0.0,
+            "high": MOST_FACTOR,
+            "step": STEP,
+        }
+        for number, course in enumerate(order)
+    ]
 
 
 def _packed(run: Counterfactual) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,17 +24,6 @@ _NEARLY_CONSTANT = 0.05
 """Share of its size by which an effect changes at most to be shown as a constant, from zero."""
 _DECADES = 1e-3
 """Of the greatest Allan deviation: what is below, as at the whole periods of a line, is off the picture."""
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A signature on one programme: figures of the chamber and of the effect, what they show, and if any."""
-
-    programme: str
-    chamber: Markup
-    signature: Markup
-    words: str
-    shows: bool = True
 
 
 def effect_page(
@@ -62,7 +50,12 @@ def effect_page(
         title=f"{card['id']} – effect",
         card=card,
         quantities=quantities_table(card),
-        panels=[panel(card, picture) for picture in pictures],
+        panels=[
+            (picture.programme, _chamber(picture), _signature(picture), words(card, picture))
+            for picture in pictures
+            if _shows(picture)
+        ],
+        silent=[picture.programme for picture in pictures if not _shows(picture)],
         about=about(card),
         curves=[rate_figure(curve) for curve in curves],
         allan=allan_figure(allan),
@@ -126,35 +119,37 @@ def about(card: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [*rows, ("source", card["source"]), *(("reference", source) for source in card["sources"])]
 
 
-def panel(card: Mapping[str, Any], picture: Picture) -> Panel:
-    """The figures of one programme."""
-    return Panel(
-        picture.programme,
-        _figure(picture, chamber=True, height=120),
-        _figure(picture, chamber=False, height=170),
-        words(card, picture),
-        picture.span != (0.0, 0.0),
-    )
+def _shows(picture: Picture) -> bool:
+    return picture.span != (0.0, 0.0)
 
 
 def words(card: Mapping[str, Any], picture: Picture) -> str:
     """What a picture shows, in a sentence."""
-    low, high = picture.span
-    if low == high == 0.0:
+    if not _shows(picture):
         return "Nothing of it shows in the output here."
+    low, high = picture.span
     unit = card["amplitude"]["unit"]
     amplitude = number(card["amplitude"]["usual"]) + ("" if unit == "1" else f" {unit}")
     what = " in the temperatures" if picture.places else ""
     return f"From {number(low)} to {number(high)} {picture.unit}{what} at an amplitude of {amplitude}."
 
 
-def _figure(picture: Picture, chamber: bool, height: int) -> Markup:
-    alt = f"{'Chamber air' if chamber else 'Signature'} over time on {picture.programme}"
+def _across(picture: Picture) -> tuple[FloatArray, str]:
+    """The times of a picture, and the title of their axis."""
     hours = picture.hours
-    across, title = (hours, "time [h]") if hours[-1] - hours[0] > _SHORT_H else (3600.0 * hours, "time [s]")
-    if chamber:
-        curves = [_reduced(across, picture.chamber, style.TRAINING)]
-        return line_figure(curves, title, "chamber [degC]", alt, height=height)
+    return (hours, "time [h]") if hours[-1] - hours[0] > _SHORT_H else (3600.0 * hours, "time [s]")
+
+
+def _chamber(picture: Picture) -> Markup:
+    across, title = _across(picture)
+    curves = [_reduced(across, picture.chamber, style.TRAINING)]
+    alt = f"Chamber air over time on {picture.programme}"
+    return line_figure(curves, title, "chamber [degC]", alt, height=120)
+
+
+def _signature(picture: Picture) -> Markup:
+    across, title = _across(picture)
+    alt = f"Signature over time on {picture.programme}"
     curves = []
     low, high = picture.span
     if low * high <= 0.0 or high - low < _NEARLY_CONSTANT * max(abs(low), abs(high)):
@@ -163,9 +158,9 @@ def _figure(picture: Picture, chamber: bool, height: int) -> Markup:
     if picture.places:
         for colour, (name, change) in zip(style.SERIES, picture.places.items()):
             curves.append(_reduced(across, change, colour, name))
-        return line_figure(curves, title, "change [degC]", alt, height=height + 30)
+        return line_figure(curves, title, "change [degC]", alt, height=200)
     curves.append(_reduced(across, picture.values, style.MODEL))
-    return line_figure(curves, title, "effect [deg/h]", alt, height=height)
+    return line_figure(curves, title, "effect [deg/h]", alt, height=170)
 
 
 def _reduced(across: FloatArray, values: FloatArray, colour: str, label: str = "") -> Curve:
@@ -198,20 +193,6 @@ Drawn = tuple[Mapping[str, Any], Picture, Sequence[RateCurve], AllanCurve | None
 deviation."""
 
 
-@dataclass(frozen=True)
-class Entry:
-    """An effect as the catalogue shows it."""
-
-    card: Mapping[str, Any]
-    quantities: Table
-    figure: Markup
-    programme: str
-    words: str
-    curves: list[Markup]
-    allan: Markup
-    about: list[tuple[str, str]]
-
-
 def catalogue_page(cards: Sequence[Drawn]) -> str:
     """The self-contained HTML page of all effects.
 
@@ -220,23 +201,22 @@ def catalogue_page(cards: Sequence[Drawn]) -> str:
     cards
         What is shown of each effect, in the order of the catalogue.
     """
-    stages: dict[str, list[Entry]] = {stage: [] for stage in STAGE_WORDS}
+    stages: dict[str, list[dict[str, Any]]] = {stage: [] for stage in STAGE_WORDS}
     for card, picture, curves, allan in cards:
-        drawn = panel(card, picture)
         over_rate = card["stage"] in OVER_RATE or (
             card["stage"] == "scale_factor" and "rate" in card["needs"]
         )
-        entry = Entry(
-            card=card,
-            quantities=quantities_table(card),
-            figure=drawn.signature if drawn.shows else Markup(""),
-            programme=picture.programme,
-            words=drawn.words,
-            curves=[rate_figure(curve) for curve in curves if over_rate],
-            allan=allan_figure(allan),
-            about=about(card),
-        )
+        entry = {
+            "card": card,
+            "quantities": quantities_table(card),
+            "figure": _signature(picture) if _shows(picture) else "",
+            "programme": picture.programme,
+            "words": words(card, picture),
+            "curves": [rate_figure(curve) for curve in curves if over_rate],
+            "allan": allan_figure(allan),
+            "about": about(card),
+        }
         stages[card["stage"]].append(entry)
-    shown = [(stage, STAGE_WORDS[stage], entries) for stage, entries in stages.items() if entries]
+    shown = [(STAGE_WORDS[stage], entries) for stage, entries in stages.items() if entries]
     warm = f"{RATE_DEGC:g} degC"
     return render("catalogue.html", title="Catalogue of effects", count=len(cards), stages=shown, warm=warm)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fogml.blind.folders import CaseFiles
 from fogml.blind.methods import diagnosis
@@ -21,18 +21,8 @@ from fogml.report.gap_words import (
     verdict_words,
 )
 from fogml.report.page import Drawing, render
-from fogml.report.tables import Table
 
 MOST_RUNS_DRAWN = 8
-
-
-@dataclass(frozen=True)
-class RunSection:
-    """A run as the page shows it."""
-
-    name: str
-    role: str
-    drawing: Drawing
 
 
 def gap_page(found: Diagnosis) -> str:
@@ -66,7 +56,7 @@ def gap_page(found: Diagnosis) -> str:
         rehearsal=gap_tables_ahead.rehearsal_table(found.rehearsal, names),
         how_far_notes=[f"{item.run}: {item.note}." for item in found.how_far if item.note],
         runs=drawn,
-        not_drawn=[s.run for s in found.series if s.run not in {d.name for d in drawn}],
+        not_drawn=[s.run for s in found.series if s.run not in {name for name, *_ in drawn}],
         against_temperature=figures_gap.against_temperature(found) if fitted_on else None,
         by_regime=figures_gap_where.by_regime(where.regime) if where.regime else None,
         by_timescale=figures_gap_where.by_timescale(where.timescale) if where.timescale else None,
@@ -114,8 +104,8 @@ def _kicker(found: Diagnosis) -> str:
     )
 
 
-def _drawn(found: Diagnosis) -> list[RunSection]:
-    """Held-out runs first, then fit runs, those with most of the gap where there are many."""
+def _drawn(found: Diagnosis) -> list[tuple[str, str, Drawing]]:
+    """Name, role and figure: held-out runs first, then fit runs, those with most of the gap of many."""
     named = bool(found.named)
     energy = {s.run: float((s.gap_recalibrated**2).sum()) for s in found.series}
     held = [s for s in found.series if s.role == "held_out"]
@@ -123,17 +113,13 @@ def _drawn(found: Diagnosis) -> list[RunSection]:
     kept = sorted(fit, key=lambda s: -energy[s.run])[: max(MOST_RUNS_DRAWN - len(held), 2)]
     held_words = "its last stretch, kept back" if found.held_out_is_part else "held out"
     shown = [*held[:MOST_RUNS_DRAWN], *(s for s in fit if s in kept)]
-    return [
-        RunSection(
-            name=s.run,
-            role="fitted on" if s.role == "fit" else held_words,
-            drawing=figures_gap.run_in_time(
-                s, [g for g in found.where.segments if s.role == "fit" and g.run == s.run], named
-            ),
-        )
-        for s in shown
-        if len(s.time_s)
-    ]
+    drawn = []
+    for s in (s for s in shown if len(s.time_s)):
+        is_fit = s.role == "fit"
+        segments = [g for g in found.where.segments if is_fit and g.run == s.run]
+        role = "fitted on" if is_fit else held_words
+        drawn.append((s.run, role, figures_gap.run_in_time(s, segments, named)))
+    return drawn
 
 
 def _agreement(found: Diagnosis, names: dict[str, str]) -> str:
@@ -150,18 +136,8 @@ def _agreement(found: Diagnosis, names: dict[str, str]) -> str:
     return "Only one run shows it by itself, so runs can't be compared."
 
 
-@dataclass(frozen=True)
-class Separating:
+def _separating(found: Diagnosis, names: dict[str, str]) -> dict[str, Any] | None:
     """The separating run as the page shows it."""
-
-    aim: str
-    steps: tuple[str, ...]
-    programme: str
-    facts: list[tuple[str, str]]
-    alternatives: Table | None
-
-
-def _separating(found: Diagnosis, names: dict[str, str]) -> Separating | None:
     run = found.separating_run
     if run is None:
         return None
@@ -176,7 +152,8 @@ def _separating(found: Diagnosis, names: dict[str, str]) -> Separating | None:
         (name, f"{number(run.distance, 2)} standard deviations of the noise"),
     ]
     others = gap_tables.alternatives_table(run.alternatives) if run.alternatives else None
-    return Separating(aim, run.steps, run.programme, facts, others)
+    shown = {"steps": run.steps, "programme": run.programme, "alternatives": others}
+    return {"aim": aim, "facts": facts, **shown}
 
 
 def _noise_words(found: Diagnosis) -> str:

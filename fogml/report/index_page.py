@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from plotly.subplots import make_subplots
@@ -18,16 +17,6 @@ from fogml.report.verdict import advice_words, worst_run
 from fogml.signals.drawn import DRAWN_POINTS, min_max_indices
 from fogml.validation.advice import advice_on
 from fogml.validation.results import AveragedSeries, Judgement
-
-
-@dataclass(frozen=True)
-class AxisLink:
-    """An axis' page and what it says in a line."""
-
-    axis: str
-    href: str
-    words: str
-    advice: dict[str, Any]
 
 
 def index_page(
@@ -63,7 +52,7 @@ def index_page(
         name=title,
         verdict=_verdict(judgements, found),
         links=[
-            AxisLink(axis, links[axis], _words(judgement), advice_words(advice_on(judgement)))
+            (axis, links[axis], _words(judgement), advice_words(advice_on(judgement)))
             for axis, judgement in judgements.items()
         ],
         table=axes_table(judgements, beside or {}),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from fogml.numerals import MISSING, duration, listed, number, percent, plural, s
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import Segment, in_order, regime_word, rounded_up, shade, time_unit
-from fogml.report.tables import Noticed, Table, noticed
+from fogml.report.tables import Table, noticed
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals import large
@@ -24,24 +23,6 @@ from fogml.validation.inspection import inspection_json
 
 _REGIMES_LISTED = 40
 _GAPS_LISTED = 12
-
-
-@dataclass(frozen=True)
-class InspectedRun:
-    """What the page shows of one run."""
-
-    name: str
-    anchor: str
-    verdict: str
-    tiles: list[Tile]
-    drawing: Drawing
-    columns: Table
-    regimes: Table | None
-    regimes_more: int
-    gaps: Table | None
-    gaps_more: int
-    findings: list[Noticed]
-    about: list[tuple[str, str]]
 
 
 def inspect_page(runs: Run | Sequence[Run], inspection: Mapping[str, Any] | None = None) -> str:
@@ -64,22 +45,23 @@ def inspect_page(runs: Run | Sequence[Run], inspection: Mapping[str, Any] | None
     return render("inspect.html", title=f"{name} – what is in it", name=name, runs=inspected)
 
 
-def _inspected(index: int, run: Run, told: Mapping[str, Any]) -> InspectedRun:
+def _inspected(index: int, run: Run, told: Mapping[str, Any]) -> dict[str, Any]:
+    """What the page shows of one run."""
     segments, gaps = told["regimes"]["list"], told["gaps"]["list"]
-    return InspectedRun(
-        name=run.name,
-        anchor=f"run-{index}",
-        verdict=_verdict(told),
-        tiles=_tiles(told),
-        drawing=recording(run),
-        columns=_columns(told),
-        regimes=_regimes(segments[:_REGIMES_LISTED]),
-        regimes_more=max(int(told["regimes"]["count"]) - _REGIMES_LISTED, 0),
-        gaps=_gaps(gaps[:_GAPS_LISTED]),
-        gaps_more=max(int(told["gaps"]["count"]) - _GAPS_LISTED, 0),
-        findings=noticed(told["findings"]),
-        about=_about(told),
-    )
+    return {
+        "name": run.name,
+        "anchor": f"run-{index}",
+        "verdict": _verdict(told),
+        "tiles": _tiles(told),
+        "drawing": recording(run),
+        "columns": _columns(told),
+        "regimes": _regimes(segments[:_REGIMES_LISTED]),
+        "regimes_more": max(int(told["regimes"]["count"]) - _REGIMES_LISTED, 0),
+        "gaps": _gaps(gaps[:_GAPS_LISTED]),
+        "gaps_more": max(int(told["gaps"]["count"]) - _GAPS_LISTED, 0),
+        "findings": noticed(told["findings"]),
+        "about": _about(told),
+    }
 
 
 def _verdict(told: Mapping[str, Any]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from fogml.numerals import averages, listed, number, percent, plural, stated, un
 from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import (
-    Noticed,
     Table,
     beside_table,
     candidates_table,
@@ -36,20 +34,6 @@ from fogml.report.verdict import (
 )
 from fogml.validation.advice import advice_on, which_to_use
 from fogml.validation.results import Judgement, RunJudgement
-
-
-@dataclass(frozen=True)
-class RunSection:
-    """What the page shows of one test run."""
-
-    judged: RunJudgement
-    anchor: str
-    in_time: Drawing
-    against_temperature: Drawing | None
-    by_regime: Drawing
-    metrics: Table
-    findings: list[Noticed]
-    left_out: str
 
 
 def train_page(
@@ -92,7 +76,13 @@ def train_page(
         train_findings=[(run.run, noticed(run.findings)) for run in judgement.train if run.findings],
         notes=_notes(judgement),
         unit_of=unit_of,
-        navigation=navigation_sections(navigation) if navigation else [],
+        # Of each test run the recorded drift as a figure, a constant one as a table.
+        navigation=[
+            (run["run"], navigation_figure(run, navigation["latitude_deg"]), _table(run, navigation))
+            for run in navigation["test"]
+        ]
+        if navigation
+        else [],
         documentation=documentation,
     )
 
@@ -127,21 +117,22 @@ def headline_tiles(judgement: Judgement) -> list[Tile]:
     return tiles
 
 
-def _section(index: int, judged: RunJudgement, judgement: Judgement) -> RunSection:
-    return RunSection(
-        judged=judged,
-        anchor=f"test-{index}",
-        in_time=figures_judgement.drift_in_time(judged, judgement.model.get("interval")),
-        against_temperature=(
+def _section(index: int, judged: RunJudgement, judgement: Judgement) -> dict[str, Any]:
+    """What the page shows of one test run."""
+    return {
+        "judged": judged,
+        "anchor": f"test-{index}",
+        "in_time": figures_judgement.drift_in_time(judged, judgement.model.get("interval")),
+        "against_temperature": (
             figures_judgement.drift_against_temperature(judged, judgement.train)
             if figures_judgement.has_temperature(judged.series)
             else None
         ),
-        by_regime=figures_judgement.rms_by_regime(judged),
-        metrics=metrics_table(judged),
-        findings=noticed(judged.findings),
-        left_out=" ".join(filter(None, (_left_out(judged), unsettled(judged)))),
-    )
+        "by_regime": figures_judgement.rms_by_regime(judged),
+        "metrics": metrics_table(judged),
+        "findings": noticed(judged.findings),
+        "left_out": " ".join(filter(None, (_left_out(judged), unsettled(judged)))),
+    }
 
 
 def _left_out(judged: RunJudgement) -> str:
@@ -171,23 +162,6 @@ def _notes(judgement: Judgement) -> list[str]:
 
 SHOWN_AXIS = "north"
 """Of the recorded drift's figure: a north gyro's drift takes a navigator furthest in a day."""
-
-
-@dataclass(frozen=True)
-class NavigationSection:
-    """What the page shows of one test run: recorded drift as a figure, a constant one as a table."""
-
-    run: str
-    drawing: Drawing
-    table: Table
-
-
-def navigation_sections(costs: Mapping[str, Any]) -> list[NavigationSection]:
-    """A section for each test run from what :func:`fogml.lab.navigation.navigation_costs` gives."""
-    return [
-        NavigationSection(run["run"], navigation_figure(run, costs["latitude_deg"]), _table(run, costs))
-        for run in costs["test"]
-    ]
 
 
 def navigation_figure(run: Mapping[str, Any], latitude_deg: float) -> Drawing:
