@@ -22,7 +22,7 @@ from fogml.report.blind_tables import (
     wanted_text,
 )
 from fogml.report.page import render
-from fogml.report.tables import Table, columns_of
+from fogml.report.tables import Row, Table, columns_of
 
 _ORACLE = "oracle"
 _STRATA_DRAWN = ("one_exact", "two_exact", "unknown_wrong_name", "mixed_known_kept", "mixed_false_name")
@@ -193,24 +193,23 @@ def _left_out(parts: Sequence[Mapping[str, Any]]) -> Table:
     )
 
 
-def _worst(cases: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
-    told = []
+def _worst(cases: Sequence[Mapping[str, Any]]) -> Table:
+    rows = []
     for case in cases:
         named = [f"{listed(item['class'], 4)} ({number(item['probability'], 2)})" for item in case["named"]]
-        told.append(
-            {
-                "case": case["case"],
-                "href": case.get("report") or "",
-                "kind": kind_words(case["kind"]),
-                "d_prime": number(case["d_prime"]) if case["true"] else MISSING,
-                "true": listed(case["true"], 4) or "nothing",
-                "left_out": listed(case["left_out"], 4) or MISSING,
-                "named": "; ".join(named) or "nothing",
-                "unknown": number(case["unknown"], 2),
-                "wrong": case["wrong"],
-            }
+        cells = (
+            case["case"],
+            kind_words(case["kind"]),
+            number(case["d_prime"]) if case["true"] else MISSING,
+            listed(case["true"], 4) or "nothing",
+            listed(case["left_out"], 4) or MISSING,
+            "; ".join(named) or "nothing",
+            number(case["unknown"], 2),
+            case["wrong"],
         )
-    return told
+        rows.append(Row(cells, link=case.get("report") or ""))
+    columns = "Case | Kind | >d′ | Truly missing | No candidate | Named | >Unknown | What is wrong"
+    return Table(columns, rows)
 
 
 def gates_table(gates: Sequence[Mapping[str, Any]]) -> Table | None:

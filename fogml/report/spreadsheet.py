@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
 from datetime import datetime
@@ -97,6 +97,10 @@ def whole_workbook(path: str | Path) -> Iterator[Writer]:
             raise (cause if isinstance(cause, OSError) else error) from None
 
 
+Heads = Sequence[str] | Mapping[str, str]
+"""Heads of a table whose rows are cells, or by the keys under which its rows, mappings, hold them."""
+
+
 class Writer:
     """Sheets with a bold header, frozen, and cells by type."""
 
@@ -118,7 +122,7 @@ class Writer:
         return self.workbook.add_worksheet(fit)
 
     def table_sheet(
-        self, name: str, heads: Sequence[str], rows: Sequence[Sequence[Any]], widths: Sequence[float] = ()
+        self, name: str, heads: Heads, rows: Iterable[Any], widths: Sequence[float] = ()
     ) -> Worksheet:
         """A new sheet of a table alone, its heads frozen, with the columns' widths, the last for the rest."""
         sheet = self.sheet(name)
@@ -128,16 +132,16 @@ class Writer:
         sheet.freeze_panes(1, 0)
         return sheet
 
-    def table(
-        self, sheet: Worksheet, heads: Sequence[str], rows: Sequence[Sequence[Any]], top: int = 0
-    ) -> int:
+    def table(self, sheet: Worksheet, heads: Heads, rows: Iterable[Any], top: int = 0) -> int:
         """Write a table from row ``top`` on; the row after it."""
-        for column, head in enumerate(heads):
+        by_key = heads if isinstance(heads, Mapping) else None
+        for column, head in enumerate(heads if by_key is None else by_key.values()):
             sheet.write_string(top, column, cell_text(head), self.bold)
-        for offset, row in enumerate(rows, start=1):
-            for column, value in enumerate(row):
-                self.cell(sheet, top + offset, column, value)
-        return top + len(rows) + 1
+        for row in rows:
+            top += 1
+            for column, value in enumerate(row if by_key is None else map(row.get, by_key)):
+                self.cell(sheet, top, column, value)
+        return top + 1
 
     def cell(self, sheet: Worksheet, row: int, column: int, value: Any) -> None:
         """A number, a text, or nothing where the value is missing or not finite."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -33,14 +34,10 @@ def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
         writer.table(sheet, (*_HEADS, *_MORE), rows, 3)
         sheet.set_column(0, 4, 24)
         sheet.set_column(5, 12, 14)
-        parts = ("start", "up", "down", "hysteresis")
-        heads = [f"{part} {when} [deg/h]" for when in ("before", "after") for part in parts]
+        told = list(product(("before", "after"), ("start", "up", "down", "hysteresis")))
+        heads = [f"{part} {when} [deg/h]" for when, part in told]
         lines = [
-            (
-                line["run"],
-                line["temperature_degC"],
-                *(line[when][part] for when in ("before", "after") for part in parts),
-            )
+            [line["run"], line["temperature_degC"], *(line[when][part] for when, part in told)]
             for line in values["soaks"]
         ]
         writer.table_sheet("Soaks", ("run", "temperature [degC]", *heads), lines, (18,))
@@ -61,54 +58,29 @@ def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
 def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
     """Write a ``batch.json`` (schema ``fogml.batch/1``), one line a unit; as `acceptance_spreadsheet`."""
     with whole_workbook(path) as writer:
-        keys = [one["quantity"] for one in values["quantities"]]
-        heads = ["unit", "axis", "verdict", "reasons"]
-        heads += [f"{q['name']} [{q['unit']}]" for q in values["quantities"]]
-        rows = [
-            (
-                one["serial_number"],
-                one["axis"],
-                one["verdict"],
-                "; ".join(one["reasons"]),
-                *(one["figures"].get(key) for key in keys),
-            )
-            for one in values["units"]
-        ]
+        heads = {"serial_number": "unit", "axis": "axis", "verdict": "verdict", "why": "reasons"}
+        heads |= {one["quantity"]: f"{one['name']} [{one['unit']}]" for one in values["quantities"]}
+        rows = [{**one["figures"], **one, "why": "; ".join(one["reasons"])} for one in values["units"]]
         writer.table_sheet("Units", heads, rows, (18,)).freeze_panes(1, 1)
-        names = ("quantity", "unit", "tested", "least", "q10", "median", "q90", "largest", "limit", "over")
+        same = ("unit", "tested", "least", "q10", "median", "q90", "largest", "limit", "over")
         told = [
-            (
-                one["name"],
-                one["unit"],
-                one["tested"],
-                *(one["distribution"][key] for key in ("least", "q10", "median", "q90", "largest")),
-                limit_words(one["limit"]),
-                one["over"],
-            )
-            for one in values["quantities"]
+            {**one, **one["distribution"], "limit": limit_words(one["limit"])} for one in values["quantities"]
         ]
+        names = {"name": "quantity", **{key: key for key in same}}
         writer.table_sheet("Distribution", names, told, (18,))
 
 
-_UNIT_COLUMNS = (
-    ("unit", "unit"),
-    ("axis", "axis"),
-    ("job", "job"),
-    ("status", "status"),
-    ("model", "model"),
-    ("run", "worst test run"),
-    ("averaging_s", "averaging [s]"),
-    ("before", "rms before [deg/h]"),
-    ("after", "rms after [deg/h]"),
-    ("floor", "noise floor [deg/h]"),
-    ("outside_training", "outside training"),
-    ("met", "limits met"),
-    ("verdict", "verdict"),
-    ("reason", "reason"),
-    ("folder", "folder"),
-)
-
-
+_UNIT_COLUMNS = {
+    **{key: key for key in ("unit", "axis", "job", "status", "model")},
+    "run": "worst test run",
+    "averaging_s": "averaging [s]",
+    "before": "rms before [deg/h]",
+    "after": "rms after [deg/h]",
+    "floor": "noise floor [deg/h]",
+    "outside_training": "outside training",
+    "met": "limits met",
+    **{key: key for key in ("verdict", "reason", "folder")},
+}
 _CAUSE_COLUMNS = (
     *("effect", "place", "units_named", "units_told", "prevalence", "shared"),
     *("amplitude", "amplitude_se", "between_units", "unit", "energy_share", "gap_rms_without"),
@@ -118,18 +90,17 @@ _CAUSE_COLUMNS = (
 def fleet_spreadsheet(fleet: Mapping[str, Any], path: str | Path) -> None:
     """Write a ``fleet.json`` (schema ``fogml.fleet/1``) as `acceptance_spreadsheet`."""
     with whole_workbook(path) as writer:
-        rows = [[unit[key] for key, _ in _UNIT_COLUMNS] for unit in fleet["units"]]
-        writer.table_sheet("Units", [head for _, head in _UNIT_COLUMNS], rows, (16,)).freeze_panes(1, 1)
+        writer.table_sheet("Units", _UNIT_COLUMNS, fleet["units"], (16,)).freeze_panes(1, 1)
         if "diagnosis" in fleet:
-            rows = [[one[key] for key in _CAUSE_COLUMNS] for one in fleet["diagnosis"]["causes"]]
-            writer.table_sheet("Causes", [key.replace("_", " ") for key in _CAUSE_COLUMNS], rows)
+            heads = {key: key.replace("_", " ") for key in _CAUSE_COLUMNS}
+            writer.table_sheet("Causes", heads, fleet["diagnosis"]["causes"])
         if "constants" in fleet:
             found = fleet["constants"]
             errors = [f"{name}, standard error" for name in found["names"]]
-            heads = ["unit", *found["names"], *errors, "distance"]
+            names = ["unit", *found["names"], *errors, "distance"]
             table = zip(found["units"], found["values"], found["se"], found["distance"], strict=True)
             rows = [[unit, *own, *se, far] for unit, own, se, far in table]
-            writer.table_sheet("Constants", heads, rows, (16,)).freeze_panes(1, 1)
+            writer.table_sheet("Constants", names, rows, (16,)).freeze_panes(1, 1)
         noticed = [(item["unit"], "needs another run", item["why"]) for item in fleet["again"]]
         noticed += [(item["unit"], "unlike the others", item["why"]) for item in fleet["outliers"]]
         writer.table_sheet("Noticed", ("unit", "what", "why"), noticed, (20, 20, 100))
