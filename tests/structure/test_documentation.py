@@ -16,6 +16,7 @@ import fogml
 from experiments.guide_commands.__main__ import NEEDS_NETWORK, ROOT, blocks_of, files_of, lines_of, pages
 from fogml.cli.docs_job import page_names
 from fogml.cli.main import app
+from fogml.features.parse import parse_features
 from fogml.runs.shipped import shipped_names
 
 CODE = Path(fogml.__file__).parent
@@ -59,6 +60,17 @@ def test_commands_and_options_within_the_text_exist(path: Path) -> None:
         command, _, context = resolved([word for word in words if word != "…"])
         known = {name for p in command.get_params(context) for name in (*p.opts, *p.secondary_opts)}
         assert {word for word in words if word.startswith("--")} <= known, text
+
+
+def test_features_in_the_tables_are_understood() -> None:
+    text = TEXTS[ROOT / "docs" / "models.md"]
+    tables = text[text.index("## Features") : text.index("The lag and the play")]
+    named = {
+        name for row in re.findall(r"^\| (`[^|]*) \|", tables, re.MULTILINE) for name in row.split("`")[1::2]
+    }
+    assert len(named) > 10
+    for name in sorted(named):
+        parse_features(name.replace("(…)", "(T, 8 degC, 600 s)"))
 
 
 def test_recordings_that_are_named_ship() -> None:
