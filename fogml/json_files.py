@@ -94,7 +94,7 @@ def json_object(value: Any, source: str, schema: str, remedy: str) -> dict[str, 
 
 def content_hash(document: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> str:
     """SHA-256 over a JSON-ready document, however it is laid out in a file, and over files beside it."""
-    text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False, default=_of_numpy)
     digest = hashlib.sha256(text.encode("ascii"))
     for name, data in sorted((files or {}).items()):
         digest.update(f"\n{json.dumps(name)} {len(data)}\n".encode("ascii"))
@@ -172,7 +172,7 @@ def json_text(values: Any, name: str, indent: int | None = None, *, ascii_only: 
     Parameters
     ----------
     values
-        Mappings, lists, texts, numbers.
+        Mappings, lists, texts, numbers, those of numpy too.
     name
         What they are called in a message.
     indent
@@ -186,13 +186,20 @@ def json_text(values: Any, name: str, indent: int | None = None, *, ascii_only: 
         If a number is NaN or infinite, naming its key.
     """
     try:
-        text = json.dumps(values, indent=indent, allow_nan=False, ensure_ascii=False)
+        text = json.dumps(values, indent=indent, allow_nan=False, ensure_ascii=False, default=_of_numpy)
     except ValueError:
         check_finite(values, name)
         raise
     # A file's name need not be text: what is not comes as the replacement character.
     text = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     return json.dumps(json.loads(text), indent=indent) if ascii_only else text
+
+
+def _of_numpy(value: Any) -> Any:
+    """Python's form of a number or an array of numpy."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no form in JSON")
 
 
 def check_finite(values: Any, name: str) -> None:

@@ -189,6 +189,8 @@ def usable_rows(run: Run, full: BoolArray) -> tuple[BoolArray, tuple[str, ...]]:
 
 def table_of_rows(rows: Sequence[RunRows], compose: Compose, max_rows: int | None = None) -> TrainingTable:
     """The table of rows that `run_rows` gave."""
+    if max_rows is not None and not (isinstance(max_rows, int | np.integer) and max_rows >= 2):
+        raise InputError(f"max_rows is {max_rows}; a whole number of 2 or above, or None, is needed")
     count = row_count(rows)
     averaging_s = 0.0
     if max_rows is not None and count > max_rows:

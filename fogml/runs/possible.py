@@ -12,7 +12,7 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.numerals import short
 from fogml.runs.clock_order import Ordered
-from fogml.runs.columns import column_spec
+from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.findings import Finding
 from fogml.signals import large
 
@@ -153,8 +153,14 @@ def _seconds(run: str, values: ArrayLike) -> FloatArray:
 
 
 def check_columns(run: str, columns: Mapping[str, FloatArray]) -> None:
-    """Refuse columns that are no recording: faulty values, a clock that does not go on."""
+    """Refuse columns that are no recording: named with a unit, faulty values, a clock that stays."""
     for name, values in columns.items():
+        plain, unit = parse_header(name)
+        if unit is not None and (spec := column_spec(plain)) is not None:
+            raise InputError(
+                f"{run}, column '{name}': here it is called '{plain}', in {spec.internal}; "
+                "Run.from_pandas takes columns with their units"
+            )
         bad = faulty(name, values)
         if bad is not None:
             row = int(np.argmax(bad))

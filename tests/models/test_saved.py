@@ -74,6 +74,18 @@ def test_model_json_names_the_folder(folder, model, train):
     assert np.array_equal(load_model(folder / "model.json").predict(train), model.predict(train))
 
 
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [("polynomial", {"ridge": np.float32(0.5)}), ("sklearn.svm.SVR", {"max_iter": np.int64(9000)})],
+)
+def test_parameters_may_be_numbers_of_numpy(train, tmp_path, name, parameters):
+    fitted = make_model(name, "T", parameters=parameters).set_params(max_rows=np.int64(100)).fit(train)
+    save_model(fitted, tmp_path / "model")
+    again = load_model(tmp_path / "model")
+    np.testing.assert_array_equal(again.predict(train), fitted.predict(train))
+    assert type(again.max_rows) is int
+
+
 def test_loaded_model_can_be_fitted_again(folder, model, train):
     loaded = load_model(folder)
     assert np.array_equal(loaded.fit(train).predict(train), model.predict(train))

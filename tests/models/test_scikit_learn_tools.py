@@ -53,6 +53,12 @@ def test_threads_do_not_change_a_bit(name: str) -> None:
     assert np.array_equal(*told)
 
 
+@pytest.mark.parametrize("most", [0, 1.5, -3])
+def test_a_number_of_rows_is_whole(most: float) -> None:
+    with pytest.raises(InputError, match=f"max_rows is {most}; a whole number"):
+        make_model("polynomial", "T").set_params(max_rows=most).fit(run(0))
+
+
 def test_runs_of_a_group_stay_together() -> None:
     # The second unit curves the other way: each judges the other badly.
     runs = [run(0), run(1), run(2, -0.01), run(3, -0.01)]

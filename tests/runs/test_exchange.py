@@ -95,6 +95,20 @@ def test_a_run_keeps_what_it_was_given() -> None:
     assert [float(run.gyro[1]) for run in made] == [np.sin(1.0)] * 3
 
 
+def test_a_run_is_in_internal_units() -> None:
+    columns = {"time": TIME, "gyro": TIME}
+    for of in (columns | {"rate [deg/h]": TIME}, {"time": TIME, "gyro [deg/h]": TIME}):
+        with pytest.raises(
+            InputError, match=r"it is called '(rate|gyro)', in deg/[sh]; Run.from_pandas takes"
+        ):
+            Run("a", of)
+    with pytest.raises(InputError, match="it is called 'rate', in deg/s"):
+        Run("a", columns).with_columns(**{"rate [deg/s]": TIME})
+    assert list(Run("a", columns | {"flow [l/min]": TIME}).columns) == ["time", "gyro", "flow [l/min]"]
+    with pytest.raises(InputError, match="gyro_unit is 'deg/s'"):
+        Run("a", columns, gyro_unit="deg/s")  # type: ignore[arg-type]
+
+
 def test_a_part_of_a_run_goes_forwards_in_time() -> None:
     whole = run()
     assert np.array_equal(whole[whole.time > 99.5].time, whole[100:].time)
