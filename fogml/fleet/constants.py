@@ -23,9 +23,10 @@ from fogml.fleet.shares import each_unit, least_squares, widening
 from fogml.intervals import SIGMA_PER_MEDIAN
 from fogml.models.box import learn_box
 from fogml.models.generalised_least_squares import runs_noise, shift_of_runs, shifted
-from fogml.models.mixed_effects import OWN_PARTS, SizePriors, fit_mixed_effects
+from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
 from fogml.models.mixed_effects_model import averages_of, composed
 from fogml.models.prior import Prior, rarity
+from fogml.models.size_priors import SizePriors
 from fogml.models.table import run_rows
 from fogml.runs.run import Run
 from fogml.signals.distributions import chi2_ppf

@@ -22,9 +22,10 @@ from fogml.models.generalised_least_squares import (
     shifted,
 )
 from fogml.models.linear import LinearRegressor
-from fogml.models.mixed_effects import OWN_PARTS, MixedEffects, SizePriors, linear_regressor
+from fogml.models.mixed_effects import OWN_PARTS, MixedEffects, linear_regressor
 from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.prior import Prior, agreement, posterior
+from fogml.models.size_priors import SizePriors
 from fogml.models.table import TrainingTable
 from fogml.numerals import percent, short
 from fogml.runs.run import Run

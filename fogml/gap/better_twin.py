@@ -16,7 +16,7 @@ from fogml.gap.posterior import Cause
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Counterfactual, Course
 from fogml.gap.rows import READ
-from fogml.gap.settings import Reported
+from fogml.gap.step_settings import Reported
 from fogml.gap.where import averages
 from fogml.numerals import short
 from fogml.runs.run import Run
@@ -25,7 +25,8 @@ from fogml.twin.draws import parameter_values
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.plant.fit import PlantFit, fit_plant
 from fogml.twin.registry import effect
-from fogml.twin.twin import Suspected, Twin, Uncertainty
+from fogml.twin.twin import Twin
+from fogml.twin.uncertainty import Suspected, Uncertainty
 
 NOT_LINEAR = ("line", "power_cycles", "sensor_steps")
 """Families that no size moves alone: of a phase of their own, or not in proportion to their size."""

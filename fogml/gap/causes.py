@@ -14,7 +14,7 @@ from fogml.gap.linear_gaussian import LinearGaussian
 from fogml.gap.posterior import Cause
 from fogml.gap.result import NAMED, Estimate, Found, Onset, RunAmplitude
 from fogml.gap.scene import Scene
-from fogml.gap.settings import Reported
+from fogml.gap.step_settings import Reported
 from fogml.signals.distributions import chi2_sf
 
 

@@ -18,7 +18,7 @@ from fogml.gap.model import EffectValue, TwinModel, with_effects
 from fogml.gap.posterior import Cause, Judgement, at_cost, judge
 from fogml.gap.result import NAMED, ConstantFit
 from fogml.twin.nominal import NAMES
-from fogml.twin.twin import Uncertainty
+from fogml.twin.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True, eq=False)

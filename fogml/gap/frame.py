@@ -16,7 +16,8 @@ from fogml.gap.linear_gaussian import LinearGaussian, Posterior, prior_factor
 from fogml.gap.model import AnyModel, Constant
 from fogml.gap.rows import READ, READ_GROUPS, Rows, slopes, through_nominal
 from fogml.gap.scene import Scene, steps_are_coarse
-from fogml.gap.settings import NoiseSettings, Priors
+from fogml.gap.settings import Priors
+from fogml.gap.step_settings import NoiseSettings
 from fogml.signals.bases import rate
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener

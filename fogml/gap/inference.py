@@ -21,7 +21,8 @@ from fogml.gap.reading import Unusable, rows_of
 from fogml.gap.rows import Rows
 from fogml.gap.scene import Scene, outstanding_lines
 from fogml.gap.search import Explanation, Search
-from fogml.gap.settings import Priors, RowSettings
+from fogml.gap.settings import Priors
+from fogml.gap.step_settings import RowSettings
 from fogml.numerals import short
 from fogml.runs.checks import refuse_dead
 from fogml.runs.run import Run

@@ -18,7 +18,8 @@ from fogml.gap.linear_gaussian import LinearGaussian, size_gains
 from fogml.gap.model import AnyModel
 from fogml.gap.reading import usable_samples
 from fogml.gap.rows import Rows
-from fogml.gap.settings import STANDARD, NoiseSettings
+from fogml.gap.settings import STANDARD
+from fogml.gap.step_settings import NoiseSettings
 from fogml.gap.unknown import unknown_families
 from fogml.intervals import Z50
 from fogml.runs.run import Run

@@ -13,7 +13,8 @@ from fogml.errors import InputError
 from fogml.gap.model import GyroModel
 from fogml.gap.own_simulator import OwnOnRun
 from fogml.gap.rows import BySample, Rows
-from fogml.gap.settings import STANDARD, RowSettings
+from fogml.gap.settings import STANDARD
+from fogml.gap.step_settings import RowSettings
 from fogml.runs.checks import rests, usual_rest
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import Run

@@ -23,7 +23,7 @@ from fogml.gap.result_parts import (
 )
 from fogml.pictures import Panel, Pictured
 from fogml.runs.run import Run
-from fogml.twin.twin import Uncertainty
+from fogml.twin.uncertainty import Uncertainty
 
 NAMED = 0.5
 """An effect is named from this probability on."""

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from fogml.arrays import FloatArray
+from fogml.gap.grids import Grids
 from fogml.gap.rows import READ, Rows
-from fogml.gap.shapes import Grids
 from fogml.runs.steps import recorded_step
 from fogml.signals.bases import lag
 from fogml.twin.effect import Effect

@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.gap.grids import Grids
 from fogml.gap.rows import READ, READ_GROUPS, Rows, slopes, through_nominal
 from fogml.gap.scene import Block, Build, Constants, Family, Scene
-from fogml.gap.shapes import Grids
 from fogml.signals.bases import bumps, decayed, lag, play, rate
 from fogml.twin.registry import effects
 

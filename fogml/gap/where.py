@@ -15,7 +15,8 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.gap.result_parts import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
 from fogml.gap.rows import Rows
-from fogml.gap.settings import STANDARD, Reported
+from fogml.gap.settings import STANDARD
+from fogml.gap.step_settings import Reported
 from fogml.intervals import Z90
 from fogml.runs.regimes import Regimes
 from fogml.signals.noise_expectation import expected_mean_square

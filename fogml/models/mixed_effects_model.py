@@ -26,7 +26,8 @@ from fogml.models.combination import (
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.intervals import Intervals, of_usual_averages
 from fogml.models.linear import LinearRegressor
-from fogml.models.mixed_effects import SizePriors, fit_mixed_effects
+from fogml.models.mixed_effects import fit_mixed_effects
+from fogml.models.size_priors import SizePriors
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
 from fogml.models.weights import intervals_of, shifts_apart, weights_of
 from fogml.numerals import percent, short

@@ -10,6 +10,7 @@ from scipy.linalg import solve_triangular
 from scipy.special import gammaln
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.settings_check import check_numbers
 from fogml.signals.distributions import students_ppf
 from fogml.signals.noise_model import flicker_ladder
 
@@ -55,6 +56,9 @@ class ChangePrior:
     wander: tuple[float, ...] = (0.0, 1 / 16, 1 / 4, 1.0)
     longest_wander: float = 1000.0
     confirming_runs: int = 2
+
+    def __post_init__(self) -> None:
+        check_numbers(self, may_be_0=("between", "wander"), above_1=("longest_wander",))
 
     def steady(self) -> ChangePrior:
         """The same where figures are known not to wander between runs."""

@@ -19,6 +19,7 @@ from fogml.runs.dropouts import RULE, DropoutRule
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.run import Run
+from fogml.settings_check import check_numbers
 from fogml.signals import large
 from fogml.strict import Strict
 
@@ -145,6 +146,9 @@ class LimitSettings:
     averaging_s: float = 60.0
     step_margin: float = 2.0
     least_step_degC: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
 
 
 LIMITS = LimitSettings()

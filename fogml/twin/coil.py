@@ -96,15 +96,13 @@ class LayeredCoil:
     Raises
     ------
     InputError
-        If layers and winding don't fit together, or are fewer than 3.
+        If layers and winding don't fit together.
     """
 
     coil: Coil = REFERENCE_COIL
 
     def __post_init__(self) -> None:
         winding_order(self.coil.winding, self.coil.layers)
-        if self.coil.layers < 3:
-            raise InputError("a layered coil has at least 3 layers")
 
     @property
     def settling_s(self) -> float:

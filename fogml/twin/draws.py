@@ -10,11 +10,21 @@ import numpy as np
 
 from fogml.errors import InputError, did_you_mean
 from fogml.twin.effect import Effect
+from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants, generator
 from fogml.twin.nominal import NAMES, NominalConstants
-from fogml.twin.plant.standard import QUANTITIES
+from fogml.twin.nominal import QUANTITIES as NOMINAL
+from fogml.twin.plant.heat import HEATING
+from fogml.twin.plant.standard import QUANTITIES as THERMAL
 from fogml.twin.registry import clashing, effect
 from fogml.twin.twin import EffectSetting, Twin
+
+_NOISE = {q.name: q for q in NOISE}
+_CONSTANTS = {
+    f"{section}.{q.name}": q
+    for section, quantities in (("nominal", NOMINAL), ("plant", THERMAL), ("plant.heating", HEATING))
+    for q in quantities
+}
 
 
 def drawn_twin(twin: Twin, seed: int, number: int) -> Twin:
@@ -44,7 +54,7 @@ def drawn_twin(twin: Twin, seed: int, number: int) -> Twin:
         name: float(np.exp(np.log(factor) * rng.standard_normal()))
         for name, factor in twin.noise_factor.items()
     }
-    noise = {name: getattr(twin.noise, name) * factor for name, factor in factors.items()}
+    noise = {n: _NOISE[n].within(getattr(twin.noise, n) * factor) for n, factor in factors.items()}
     changed = changed.with_noise(**noise)
     for id, held in twin.suspected.items():
         acts = rng.random() < held.probability
@@ -57,7 +67,7 @@ def parameter_values(twin: Twin) -> dict[str, float]:
     """Every parameter that may be uncertain, by its place in a twin file."""
     plant = twin.plant
     values = {f"nominal.{name}": value for name, value in asdict(twin.nominal).items()}
-    values |= {f"plant.{q.name}": float(getattr(plant.constants, q.name)) for q in QUANTITIES}
+    values |= {f"plant.{q.name}": float(getattr(plant.constants, q.name)) for q in THERMAL}
     values |= {
         "plant.heating.steady": plant.heating.steady_w,
         "plant.heating.time_constant": plant.heating.time_constant_s,
@@ -81,6 +91,8 @@ def moved(twin: Twin, name: str, by: float) -> Twin:
         hint = did_you_mean(name, values)
         raise InputError(f"uncertainty: the twin has no parameter '{name}'; {hint}it has {', '.join(values)}")
     value = values[name] + by
+    if name in _CONSTANTS:
+        value = _CONSTANTS[name].within(value)
     section, _, rest = name.partition(".")
     if section == "nominal":
         return twin.with_nominal(**{rest: value})
@@ -94,15 +106,13 @@ def moved(twin: Twin, name: str, by: float) -> Twin:
     if rest.startswith("heating."):
         heating = plant.heating
         if rest == "heating.steady":
-            warm = max(value, 0.0)
-            cold = heating.initial_w * warm / heating.steady_w if heating.steady_w > 0.0 else warm
-            heating = replace(heating, steady_w=warm, initial_w=cold)
+            cold = heating.initial_w * value / heating.steady_w if heating.steady_w > 0.0 else value
+            cold = _CONSTANTS["plant.heating.initial"].within(cold)
+            heating = replace(heating, steady_w=value, initial_w=cold)
         else:
-            heating = replace(heating, time_constant_s=max(value, 1.0))
+            heating = replace(heating, time_constant_s=value)
         return replace(twin, plant=replace(plant, heating=heating))
-    limits_of = {q.name: q.limits for q in QUANTITIES}
-    constants = replace(plant.constants, **{rest: float(np.clip(value, *limits_of[rest]))})
-    return replace(twin, plant=replace(plant, constants=constants))
+    return replace(twin, plant=replace(plant, constants=replace(plant.constants, **{rest: value})))
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.twin.quantities import Quantity
+from fogml.twin.quantities import Quantity, check_all
 
 URAD_S_IN_DEG_H = math.degrees(1e-6) * 3600.0
 """A rate of one microradian per second [deg/h]."""
@@ -56,8 +56,7 @@ class NoiseConstants:
     R: float = 0.0
 
     def __post_init__(self) -> None:
-        for quantity in QUANTITIES:
-            quantity.check(getattr(self, quantity.name), "noise")
+        check_all(self, QUANTITIES, "noise")
 
     def as_dict(self) -> dict[str, float]:
         """The coefficients by name."""

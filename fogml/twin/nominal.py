@@ -10,15 +10,13 @@ DeltaT is the mean of T over the last 64 s less that over the 64 s before [degC]
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
-from numbers import Real
 
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError
 from fogml.twin.inputs import Inputs
+from fogml.twin.quantities import Quantity, check_all, limited
 
 DELTA_WINDOW_S = 64.0
 DELTA = "DeltaT"
@@ -35,7 +33,7 @@ class NominalConstants:
     Raises
     ------
     InputError
-        If one is not a finite number.
+        If one is not physical.
     """
 
     e0: float = 0.0
@@ -48,9 +46,7 @@ class NominalConstants:
     m: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-                raise InputError(f"nominal: '{name}' is {value!r}; a number in {UNITS[name]} is needed")
+        check_all(self, QUANTITIES, "nominal")
 
 
 UNITS = {
@@ -63,6 +59,7 @@ UNITS = {
     "g": "deg/h/degC",
     "m": "deg/h/degC",
 }
+QUANTITIES: tuple[Quantity, ...] = tuple(limited(name, unit, -1e6, 1e6) for name, unit in UNITS.items())
 PRIOR_SD = NominalConstants(e0=500.0, k1=50.0, k2=0.5, b0=5.0, b1=0.05, b2=5e-4, g=0.5, m=2.0)
 """Standard deviations of the normal priors with mean 0."""
 NAMES = tuple(field.name for field in fields(NominalConstants))

@@ -11,13 +11,13 @@ H. C. Lefevre, The Fiber-Optic Gyroscope, 2nd ed. (2014), for all of them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError
+from fogml.twin.quantities import check_all, limited
 
 _Power = TypeVar("_Power", float, FloatArray)
 LIGHT_M_S = 299_792_458.0
@@ -29,6 +29,27 @@ WINDINGS: tuple[Winding, ...] = get_args(Winding)
 _COHERENCE: dict[Spectrum, float] = {"gaussian": 2.0 * math.sqrt(2.0 * math.log(2.0) / math.pi), "flat": 2.0}
 DEG_H = math.pi / 180.0 / 3600.0
 """One deg/h in rad/s."""
+
+COIL = (
+    limited("length", "m", 1.0, 1e5),
+    limited("diameter", "m", 1e-3, 10.0),
+    limited("wavelength", "m", 1e-7, 1e-5),
+    limited("index", "1", 1.0, 4.0),
+    limited("index_slope", "1/degC", -1e-3, 1e-3),
+    limited("expansion", "1/degC", -1e-3, 1e-3),
+    limited("pitch", "m", 1e-6, 1e-2),
+    limited("diffusivity", "m2/s", 1e-9, 1e-3),
+    limited("lead_1", "m", 0.0, 1e3),
+    limited("lead_2", "m", 0.0, 1e3),
+)
+"""The constants of `Coil` with their units."""
+RECEIVER = (
+    limited("line_width", "m", 1e-12, 1e-6),
+    limited("responsivity", "A/W", 1e-3, 10.0),
+    limited("resistance", "ohm", 1.0, 1e9),
+    limited("temperature_k", "K", 1.0, 1e3),
+)
+"""The constants of `Receiver` with their units."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +86,7 @@ class Coil:
     lead_2: float = 0.0
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if entry.name == "winding" or (entry.name.startswith("lead") and value == 0.0):
-                continue
-            lowest = -math.inf if entry.name in ("index_slope", "expansion") else 0.0
-            if not (math.isfinite(value) and value > lowest):
-                raise InputError(f"coil: {entry.name} is {value:g}; it must be a number above {lowest:g}")
+        check_all(self, (*COIL, limited("layers", "layers", 3, 1000, whole=True)), "coil")
 
     @property
     def phase_slope(self) -> float:
@@ -159,10 +174,7 @@ class Receiver:
     temperature_k: float = 300.0
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(f"receiver: {entry.name} is {value:g}; it must be a number above 0")
+        check_all(self, RECEIVER, "receiver")
 
     def angle_random_walk(self, coil: Coil, power: float, modulation_depth: float) -> float:
         """Angle random walk [deg/sqrt(h)] from shot, thermal and excess noise.

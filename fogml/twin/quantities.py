@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any, Literal
@@ -106,7 +107,8 @@ class Quantity:
             If it is not a finite number within `limits`; the message names owner and key.
         """
         if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-            raise InputError(f"{owner}: '{self.name}' is {value!r}; a number in {self.unit} is needed")
+            unit = "" if self.unit == "1" else f" in {self.unit}"
+            raise InputError(f"{owner}: '{self.name}' is {value!r}; a number{unit} is needed")
         if self.whole and value != round(value):
             raise InputError(f"{owner}: '{self.name}' is {value:g}; a whole number is needed")
         low, high = self.limits
@@ -116,6 +118,17 @@ class Quantity:
                 f"it lies between {low:g} and {with_unit(high, self.unit)}"
             )
         return float(value)
+
+
+def check_all(held: object, quantities: Iterable[Quantity], owner: str) -> None:
+    """Check what `held` has under the quantities' names, see `Quantity.check`."""
+    for quantity in quantities:
+        quantity.check(getattr(held, quantity.name), owner)
+
+
+def limited(name: str, unit: str, low: float, high: float, *, whole: bool = False) -> Quantity:
+    """A quantity that has limits and no usual range."""
+    return Quantity(name, unit, (0.0, 0.0), (0.0, 0.0), limits=(low, high), whole=whole)
 
 
 def unsigned(

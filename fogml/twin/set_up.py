@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from fogml.errors import InputError
-from fogml.runs.columns import coil_sensor_number
+from fogml.runs.columns import KNOWN, coil_sensor_number, is_temperature
 from fogml.twin.plant.coil import CoilEnds, RadialLine, with_ends, with_line
 from fogml.twin.plant.heat import Airflow, SelfHeating
 from fogml.twin.plant.network import ThermalNetwork
-from fogml.twin.plant.standard import ThermalConstants, standard_network
-from fogml.twin.quantities import Quantity, shared
+from fogml.twin.plant.standard import ORDER, ThermalConstants, standard_network
+from fogml.twin.quantities import Quantity, check_all, shared
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,9 @@ class Plant:
     airflow: Airflow = field(default_factory=Airflow)
     line: RadialLine | None = None
     ends: CoilEnds | None = None
+
+    def __post_init__(self) -> None:
+        ORDER.check(self.order, "thermal plant")
 
     @cached_property
     def network(self) -> ThermalNetwork:
@@ -82,9 +85,8 @@ class SensorErrors:
     reads: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for quantity in SENSOR_QUANTITIES:
-            quantity.check(getattr(self, quantity.name), "sensor")
-        if self.reads and abs(sum(self.reads.values()) - 1.0) > 1e-9:
+        check_all(self, SENSOR_QUANTITIES, "sensor")
+        if self.reads and not abs(sum(self.reads.values()) - 1.0) <= 1e-9:
             raise InputError(f"sensor: weights of 'reads' add to {sum(self.reads.values()):g}; 1 is needed")
 
 
@@ -94,6 +96,12 @@ class Sensors:
 
     common: SensorErrors = field(default_factory=SensorErrors)
     single: Mapping[str, SensorErrors] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in self.single:
+            if not is_temperature(name):
+                known = ", ".join(key for key in KNOWN if is_temperature(key)) + " and T1, T2 ..."
+                raise InputError(f"key 'sensors.single.{name}' is no temperature's name; known are {known}")
 
     def of(self, name: str) -> SensorErrors:
         """Errors of the sensor behind a column."""
@@ -132,5 +140,4 @@ class Surroundings:
     vertical_field: float = EARTH_VERTICAL_UT
 
     def __post_init__(self) -> None:
-        for quantity in SURROUNDING_QUANTITIES:
-            quantity.check(getattr(self, quantity.name), "surroundings")
+        check_all(self, SURROUNDING_QUANTITIES, "surroundings")

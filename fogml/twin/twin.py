@@ -12,16 +12,14 @@ What is not known of it stands in a twin file as::
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from fogml.arrays import FloatArray
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are, quoted
 from fogml.twin.coil import LayeredCoil
 from fogml.twin.effect import Effect, LoggerEffect, NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.noise import NoiseConstants
@@ -29,9 +27,10 @@ from fogml.twin.nominal import PRIOR_SD, NominalConstants
 from fogml.twin.optics import REFERENCE_COIL, Coil, Light, Receiver
 from fogml.twin.plant.coil import END_NODES, CoilEnds, with_ends
 from fogml.twin.plant.network import ThermalNetwork
-from fogml.twin.quantities import Grade
+from fogml.twin.quantities import GRADES, Grade, limited
 from fogml.twin.registry import catalogue_order, effect
 from fogml.twin.set_up import Plant, Sensors, Surroundings
+from fogml.twin.uncertainty import Suspected, Uncertainty
 
 if TYPE_CHECKING:
     from fogml.runs.facts import Facts
@@ -39,63 +38,6 @@ if TYPE_CHECKING:
     from fogml.twin.programme import Programme
     from fogml.twin.simulate import Simulation
     from fogml.twin.truth import Truth
-
-
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """Covariance of a twin's parameters about the values that it states.
-
-    Attributes
-    ----------
-    names
-        Of the parameters, by their places in a twin file.
-    covariance
-        In the units of the file, shape (k, k).
-    source
-        Where it comes from.
-    """
-
-    names: tuple[str, ...]
-    covariance: FloatArray
-    source: str = ""
-
-    def __post_init__(self) -> None:
-        matrix = np.asarray(self.covariance, dtype=np.float64)
-        count = len(self.names)
-        if len(set(self.names)) < count:
-            raise InputError("uncertainty: a parameter is named twice")
-        if matrix.shape != (count, count):
-            raise InputError(
-                f"uncertainty: a covariance of {count} rows of {count} numbers was expected, one for each "
-                "parameter"
-            )
-        scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-        scale[scale == 0.0] = 1.0
-        unit = matrix / np.outer(scale, scale)
-        if not np.allclose(unit, unit.T, atol=1e-6) or np.linalg.eigvalsh(unit).min(initial=0.0) < -1e-6:
-            raise InputError("uncertainty: the covariance is not one: symmetric, no variance below 0")
-        object.__setattr__(self, "covariance", 0.5 * (matrix + matrix.T))
-
-    def drawn(self, rng: np.random.Generator) -> dict[str, float]:
-        """How far each parameter is from its value, in one draw."""
-        # In units of deviations: in a file's own, rounding of the large ones outdoes the small.
-        scale = np.sqrt(np.maximum(np.diag(self.covariance), np.finfo(np.float64).tiny))
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
-        off = scale * (vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(values))))
-        return dict(zip(self.names, off.tolist()))
-
-
-@dataclass(frozen=True)
-class Suspected:
-    """An effect that may act, not sure enough to be on: its probability, amplitude and shape."""
-
-    probability: float
-    amplitude: float
-    shape: Mapping[str, float]
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.probability <= 1.0:
-            raise InputError(f"probability is {self.probability:g}; it lies between 0 and 1")
 
 
 RATE_WINDOW_S = 64.0
@@ -177,6 +119,11 @@ class Twin:
     def __post_init__(self) -> None:
         # Raises where layers and winding don't fit together.
         LayeredCoil(self.coil)
+        if self.grade not in GRADES:
+            raise InputError(f"grade is {quoted(self.grade)}; known are {', '.join(GRADES)}")
+        for name, deviation in vars(self.nominal_sd).items():
+            if deviation < 0.0:
+                raise InputError(f"nominal: 'sd' of '{name}' is {deviation:g}; 0 or more is needed")
         settings = {}
         for id, setting in self.settings.items():
             declared = effect(id)
@@ -187,11 +134,18 @@ class Twin:
                     raise InputError(f"effects '{id}' and '{other}' can't be on at the same time; remove one")
         ordered = dict(sorted(settings.items(), key=lambda item: catalogue_order(effect(item[0]))))
         object.__setattr__(self, "settings", MappingProxyType(ordered))
+        suspected = {}
         for id, held in self.suspected.items():
-            effect(id).checked({"amplitude": held.amplitude, **held.shape})
+            given = effect(id).checked({"amplitude": held.amplitude, **held.shape})
+            suspected[id] = Suspected(held.probability, *given)
             if id in self.settings:
                 raise InputError(f"effect '{id}' is on and suspected; it is one of the two")
+        object.__setattr__(self, "suspected", MappingProxyType(suspected))
         factors = dict.fromkeys(("N", "B", "K"), NOISE_FACTOR) | dict(self.noise_factor)
+        for name, factor in factors.items():
+            if name not in vars(self.noise):
+                raise InputError(f"noise: 'factor' of {known_are(name, vars(self.noise), 'terms')}")
+            limited("factor", "1", 1.0, math.inf).check(factor, f"noise: '{name}'")
         object.__setattr__(self, "noise_factor", MappingProxyType(factors))
 
     def __repr__(self) -> str:
@@ -294,7 +248,9 @@ class Twin:
             if id not in self.settings:
                 on = ", ".join(self.settings) or "none"
                 raise InputError(f"twin '{self.name}': effect '{id}' is not on; on are {on}")
-        return replace(self, settings={k: v for k, v in self.settings.items() if k not in ids})
+        left = {k: v for k, v in self.settings.items() if k not in ids}
+        known = self.uncertainty and self.uncertainty.without(*(f"effects.{id}." for id in ids))
+        return replace(self, settings=left, uncertainty=known)
 
     def with_nominal(self, **constants: float) -> Twin:
         """The twin with nominal constants changed."""

@@ -12,15 +12,15 @@ from pydantic import ValidationError
 
 from fogml.errors import InputError, did_you_mean, known_are
 from fogml.outputs import whole_file
-from fogml.runs.columns import KNOWN, is_temperature
 from fogml.twin.draws import moved
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
-from fogml.twin.optics import Coil, Receiver
+from fogml.twin.nominal import QUANTITIES as NOMINAL
+from fogml.twin.optics import COIL, RECEIVER, Coil, Receiver
+from fogml.twin.plant.coil import LINE, CoilEnds, RadialLine
 from fogml.twin.plant.coil import QUANTITIES as ENDS
-from fogml.twin.plant.coil import CoilEnds, RadialLine
-from fogml.twin.plant.heat import Airflow, SelfHeating
+from fogml.twin.plant.heat import AIRFLOW, HEATING, Airflow, SelfHeating
 from fogml.twin.plant.standard import QUANTITIES as THERMAL
 from fogml.twin.plant.standard import ThermalConstants
 from fogml.twin.quantities import Quantity, with_unit
@@ -33,19 +33,9 @@ from fogml.twin.set_up import (
     Sensors,
     Surroundings,
 )
-from fogml.twin.twin import EffectSetting, Suspected, Twin, Uncertainty
-from fogml.twin.twin_schema import (
-    AIRFLOW,
-    COIL,
-    HEATING,
-    LINE,
-    NOMINAL,
-    PROBABILITY,
-    RECEIVER,
-    TWIN_FILE,
-    Stated,
-    message,
-)
+from fogml.twin.twin import EffectSetting, Twin
+from fogml.twin.twin_schema import PROBABILITY, TWIN_FILE, Stated, message
+from fogml.twin.uncertainty import Suspected, Uncertainty
 from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.twin/1"
@@ -218,11 +208,6 @@ def _sensors(source: str, stated: Any) -> Sensors:
     shared = SensorErrors(**common, reads={})
     single = {}
     for name, held in stated.single.items():
-        if not is_temperature(name):
-            known = ", ".join(key for key in KNOWN if is_temperature(key)) + " and T1, T2 ..."
-            raise InputError(
-                f"{source}: key 'sensors.single.{name}' is no temperature's name; known are {known}"
-            )
         own = _values(source, f"sensors.single.{name}", held, SENSOR_QUANTITIES)
         single[name] = replace(shared, **own, reads=held.reads)
     return Sensors(shared, single)

@@ -10,53 +10,18 @@ from pydantic import BaseModel, BeforeValidator, Field, ValidationError, create_
 from fogml.errors import known_are, quoted
 from fogml.strict import Strict, first_fault
 from fogml.twin.noise import QUANTITIES as NOISE
-from fogml.twin.nominal import UNITS
-from fogml.twin.optics import Winding
+from fogml.twin.nominal import QUANTITIES as NOMINAL
+from fogml.twin.optics import COIL, RECEIVER, Winding
+from fogml.twin.plant.coil import LINE
 from fogml.twin.plant.coil import QUANTITIES as ENDS
+from fogml.twin.plant.heat import AIRFLOW, HEATING
 from fogml.twin.plant.standard import LARGEST_ORDER
 from fogml.twin.plant.standard import QUANTITIES as THERMAL
-from fogml.twin.quantities import Grade, Quantity
+from fogml.twin.quantities import Grade, Quantity, limited
 from fogml.twin.set_up import SENSOR_QUANTITIES, SURROUNDING_QUANTITIES
 
-_ANY = (0.0, 0.0)
 _SCHEMA: Any = Literal["fogml.twin/1"]
-
-
-def _quantity(name: str, unit: str, low: float = -1e6, high: float = 1e6) -> Quantity:
-    return Quantity(name, unit, _ANY, _ANY, limits=(low, high))
-
-
-NOMINAL = tuple(_quantity(name, unit) for name, unit in UNITS.items())
-HEATING = (
-    _quantity("steady", "W", 0.0, 1e3),
-    _quantity("initial", "W", 0.0, 1e3),
-    _quantity("time_constant", "s", 1.0),
-)
-AIRFLOW = (_quantity("fan_gain", "1", 0.0, 100.0), _quantity("rotation_gain", "1", 0.0, 100.0))
-COIL = (
-    _quantity("length", "m", 1.0, 1e5),
-    _quantity("diameter", "m", 1e-3, 10.0),
-    _quantity("wavelength", "m", 1e-7, 1e-5),
-    _quantity("index", "1", 1.0, 4.0),
-    _quantity("index_slope", "1/degC", -1e-3, 1e-3),
-    _quantity("expansion", "1/degC", -1e-3, 1e-3),
-    _quantity("pitch", "m", 1e-6, 1e-2),
-    _quantity("diffusivity", "m2/s", 1e-9, 1e-3),
-    _quantity("lead_1", "m", 0.0, 1e3),
-    _quantity("lead_2", "m", 0.0, 1e3),
-)
-RECEIVER = (
-    _quantity("line_width", "m", 1e-12, 1e-6),
-    _quantity("responsivity", "A/W", 1e-3, 10.0),
-    _quantity("resistance", "ohm", 1.0, 1e9),
-    _quantity("temperature_k", "K", 1.0, 1e3),
-)
-LINE = (
-    _quantity("inner_radius", "m", 1e-4, 10.0),
-    _quantity("outer_radius", "m", 1e-4, 10.0),
-    _quantity("diffusivity", "m2/s", 1e-9, 1e-3),
-)
-PROBABILITY = _quantity("probability", "1", 0.0, 1.0)
+PROBABILITY = limited("probability", "1", 0.0, 1.0)
 
 
 class Stated(Strict):

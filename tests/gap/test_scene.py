@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fogml.gap.grids import Grids
 from fogml.gap.scene import Scene, outstanding_lines
-from fogml.gap.shapes import Grids
 
 
 def rows(first_s: float, span_s: float, row_s: float, started: datetime | None) -> SimpleNamespace:

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from fogml.gap.shapes import Grids
+from fogml.gap.grids import Grids
 from fogml.gap.thermal_families import transition
 from fogml.signals.bases import bumps, preisach, relays
 from fogml.signals.recursions import play_kernel

@@ -10,9 +10,10 @@ from fogml.features.features import Features
 from fogml.models.box import moves_both_ways
 from fogml.models.combination import LeftOut
 from fogml.models.folds import dealt_blocks
-from fogml.models.mixed_effects import SizePriors, fit_mixed_effects
+from fogml.models.mixed_effects import fit_mixed_effects
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
+from fogml.models.size_priors import SizePriors
 from fogml.models.table import TrainingTable
 from fogml.models.weights import skill_of, weights_of
 from fogml.runs.facts import Facts

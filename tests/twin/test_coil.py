@@ -139,5 +139,5 @@ def test_faults_are_refused() -> None:
         winding_order("sextupole")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="multiple of 4 layers, not 30"):
         winding_order("quadrupole", 30)
-    with pytest.raises(InputError, match="at least 3 layers"):
+    with pytest.raises(InputError, match="lies between 3 and 1000 layers"):
         LayeredCoil(Coil(winding="dipole", layers=2))

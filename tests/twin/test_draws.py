@@ -15,8 +15,9 @@ from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.plant.standard import ThermalConstants
 from fogml.twin.set_up import Plant
 from fogml.twin.simulate import simulate
-from fogml.twin.twin import Suspected, Twin, Uncertainty
+from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, save_twin, twin_dict
+from fogml.twin.uncertainty import Suspected, Uncertainty
 
 NAMES = ("nominal.b0", "effects.thermal_hysteresis.half_width", "plant.case")
 COVARIANCE = np.array([[0.04, 0.05, 0.0], [0.05, 0.25, -6.0], [0.0, -6.0, 900.0]])

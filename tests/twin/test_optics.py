@@ -60,14 +60,19 @@ def test_excess_noise_is_twice_the_coherence_time_of_polarised_light(spectrum: S
 
 def test_how_each_noise_follows_the_power() -> None:
     depth = 0.75 * math.pi
-    broad = Receiver(line_width=1e3)  # no excess noise
+    broad = Receiver(line_width=1e-6)
 
     def walk(receiver: Receiver, power: float) -> float:
         return receiver.angle_random_walk(REFERENCE_COIL, power, depth)
 
     assert walk(Receiver(), 1e-2) == pytest.approx(walk(Receiver(), 2e-2), rel=0.01)  # excess
-    cold = Receiver(line_width=1e3, resistance=1e15)
-    assert walk(cold, 1e-5) == pytest.approx(math.sqrt(2.0) * walk(cold, 2e-5), rel=1e-6)  # shot
+    # Shot noise is what goes with the power, beside what stays and what goes with its square.
+    powers = np.array([1e-7, 2e-7, 4e-7])
+    noise = [
+        broad.phase_density(REFERENCE_COIL, p, depth) * (0.45 * p * math.sin(depth)) ** 2 for p in powers
+    ]
+    shot = np.linalg.solve(np.vander(powers / 1e-7, increasing=True), noise)[1]
+    assert shot == pytest.approx(2.0 * 1.602176634e-19 * 0.45e-7 * (1.0 + math.cos(depth)), rel=1e-6)
     assert walk(broad, 1e-9) == pytest.approx(2.0 * walk(broad, 2e-9), rel=0.01)  # thermal
 
 
@@ -79,5 +84,5 @@ def test_walk_of_a_phase_density() -> None:
 
 @pytest.mark.parametrize("fault", [{"length": 0.0}, {"diameter": -1.0}, {"index": math.nan}])
 def test_unphysical_coils_are_refused(fault: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=f"coil: {next(iter(fault))} is"):
+    with pytest.raises(InputError, match=f"coil: '{next(iter(fault))}' is"):
         Coil(**fault)

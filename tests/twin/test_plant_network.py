@@ -219,7 +219,7 @@ def test_faults_are_named() -> None:
         standard_network().temperatures(np.arange(3.0), {"T_case": np.zeros(3)})
     with pytest.raises(InputError, match="heat capacity of 'T_case' is -1"):
         replace(standard_network(), capacities={"T_case": -1.0})
-    with pytest.raises(InputError, match="order is 0"):
+    with pytest.raises(InputError, match="'order' is 0"):
         standard_network(order=0)
     with pytest.raises(InputError, match="'plate_share' is 9"):
         ThermalConstants(plate_share=9.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import asdict
+import math
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,13 @@ import pytest
 import yaml
 
 from fogml.errors import InputError
+from fogml.twin.nominal import NominalConstants
+from fogml.twin.plant.coil import CoilEnds, RadialLine
+from fogml.twin.plant.heat import Airflow, SelfHeating
+from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import TWIN_FOLDER, load_twin, save_twin, twin_dict, twin_from, twin_names
+from fogml.twin.uncertainty import Suspected, Uncertainty
 
 ROOT = Path(__file__).parents[2]
 
@@ -152,6 +158,82 @@ def test_other_faults(tmp_path):
 def test_effects_that_exclude_each_other():
     with pytest.raises(InputError, match="can't be on at the same time"):
         Twin().with_effect("arw_physics").with_effect("angle_random_walk")
+
+
+BESIDE = {
+    "plant.line": RadialLine(),
+    "plant.ends": CoilEnds(),
+    "plant.heating": SelfHeating(5.0, 8.0),
+    "plant.airflow": Airflow(0.5, 0.5),
+}
+
+
+SECTIONS = (
+    *("nominal", "nominal_sd", "noise", "coil", "receiver", "plant", "plant.constants", "plant.heating"),
+    *("plant.airflow", "plant.line", "plant.ends", "sensors.common", "surroundings"),
+)
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_what_makes_a_twin_in_python_comes_back_from_its_file(section, tmp_path):
+    """A value is refused where it is given, or its file reads back as the same twin."""
+    twin, path = load_twin("nominal"), tmp_path / "twin.yaml"
+    outer, _, inner = section.partition(".")
+    whole = getattr(twin, outer)
+    held = BESIDE.get(section) or (getattr(whole, inner) if inner else whole)
+    refused = 0
+    for entry in fields(held):
+        if not isinstance(getattr(held, entry.name), int | float):
+            continue
+        for value in (math.nan, math.inf, -1.0, 0.0, 1e-9, 1e9, 1e300, -1e300):
+            try:
+                changed = replace(held, **{entry.name: value})
+                made = replace(twin, **{outer: replace(whole, **{inner: changed}) if inner else changed})
+            except InputError:
+                refused += 1
+                continue
+            save_twin(made, path)
+            assert twin_dict(load_twin(path)) == twin_dict(made), (entry.name, value)
+    assert refused
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"noise_factor": {"M": 2.0}}, "noise: 'factor' of .*terms are Q, N, B, K, R"),
+        ({"noise_factor": {"N": 0.5}}, "'N': 'factor' is 0.5"),
+        ({"noise_factor": {"N": math.nan}}, "'N': 'factor' is nan"),
+        ({"grade": "lunar"}, "grade is 'lunar'"),
+        ({"nominal_sd": NominalConstants(b0=-1.0)}, "'sd' of 'b0' is -1"),
+    ],
+)
+def test_what_no_file_can_hold_is_refused_in_python_too(change, message):
+    with pytest.raises(InputError, match=message):
+        Twin(**change)
+    with pytest.raises(InputError, match="add to nan"):
+        SensorErrors(reads={"T_in": math.nan})
+    with pytest.raises(InputError, match="zz' is no temperature"):
+        Sensors(single={"zz": SensorErrors()})
+    with pytest.raises(InputError, match="a covariance of 1 rows"):
+        Uncertainty(("nominal.b0",), np.array([[math.inf]]))
+
+
+def test_an_effect_that_goes_takes_its_uncertainty_along(tmp_path):
+    names = ("nominal.b0", "effects.sensor_lag.amplitude", "plant.case")
+    covariance = np.array([[4.0, 0.1, 3.0], [0.1, 1.0, 0.2], [3.0, 0.2, 9.0]])
+    twin = replace(Twin().with_effect("sensor_lag"), uncertainty=Uncertainty(names, covariance))
+    save_twin(twin.without_effect("sensor_lag"), tmp_path / "twin.yaml")
+    left = load_twin(tmp_path / "twin.yaml").uncertainty
+    assert left.names == ("nominal.b0", "plant.case")
+    np.testing.assert_array_equal(left.covariance, [[4.0, 3.0], [3.0, 9.0]])
+
+
+def test_a_suspected_effect_has_its_usual_shape_unless_stated(tmp_path):
+    id = "thermal_hysteresis"
+    twin = replace(Twin(), suspected={id: Suspected(0.3, 0.1, {})})
+    save_twin(twin, tmp_path / "twin.yaml")
+    assert load_twin(tmp_path / "twin.yaml").suspected[id] == twin.suspected[id]
+    assert twin.suspected[id].shape == Twin().with_effect(id).settings[id].shape
 
 
 def test_a_twin_is_never_changed_in_place():

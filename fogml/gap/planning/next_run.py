@@ -23,6 +23,7 @@ from fogml.gap.rows import Rows
 from fogml.gap.search import Search
 from fogml.gap.shapes import usual_shapes
 from fogml.numerals import short
+from fogml.settings_check import check_numbers
 from fogml.signals.bases import corners
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.programme import Programme, programme_from
@@ -51,6 +52,9 @@ class RepeatSettings:
     off_h: float = 1.0
     most_steps: int = 60
     most_members: int = 4
+
+    def __post_init__(self) -> None:
+        check_numbers(self, may_be_0=("later_h", "off_h"))
 
 
 REPEAT = RepeatSettings()

@@ -12,9 +12,15 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.twin.plant.network import PlantState, ThermalNetwork
-from fogml.twin.quantities import Quantity, shared
+from fogml.twin.quantities import Quantity, check_all, limited, shared
 
 _FACE_SHARE = 1e-3
+LINE = (
+    limited("inner_radius", "m", 1e-4, 10.0),
+    limited("outer_radius", "m", 1e-4, 10.0),
+    limited("diffusivity", "m2/s", 1e-9, 1e-3),
+)
+"""The constants of `RadialLine` with their units."""
 _LARGEST_LAYERS = 1000
 
 
@@ -45,15 +51,12 @@ class RadialLine:
     layers: int = 32
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.inner_radius < self.outer_radius < 10.0:
+        check_all(self, (*LINE, limited("layers", "layers", 1, _LARGEST_LAYERS, whole=True)), "coil")
+        if not self.inner_radius < self.outer_radius:
             raise InputError(
                 f"coil: radii are {self.inner_radius:g} and {self.outer_radius:g} m; "
-                "the inner one is above 0 and below the outer one"
+                "the inner one is below the outer one"
             )
-        if not 1e-9 <= self.diffusivity <= 1e-3:
-            raise InputError(f"coil: diffusivity is {self.diffusivity:g} m2/s; about 1e-7 to 3e-7 is usual")
-        if not 1 <= self.layers <= _LARGEST_LAYERS:
-            raise InputError(f"coil: layers is {self.layers}; it lies between 1 and {_LARGEST_LAYERS}")
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -167,8 +170,7 @@ class CoilEnds:
     bottom: float = 300.0
 
     def __post_init__(self) -> None:
-        for quantity in QUANTITIES:
-            quantity.check(getattr(self, quantity.name), "thermal plant, ends")
+        check_all(self, QUANTITIES, "thermal plant, ends")
 
 
 def with_ends(network: ThermalNetwork, ends: CoilEnds) -> ThermalNetwork:

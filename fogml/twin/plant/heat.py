@@ -8,10 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError
+from fogml.twin.quantities import check_all, limited
 
 PowerWindows = tuple[tuple[float, float], ...]
 """When a unit is on: (from, to) [s] in time order, without overlap; infinite where long before or after."""
+HEATING = (
+    limited("steady", "W", 0.0, 1e3),
+    limited("initial", "W", 0.0, 1e3),
+    limited("time_constant", "s", 1.0, 1e6),
+)
+"""The constants of `SelfHeating` with their units."""
+AIRFLOW = (limited("fan_gain", "1", 0.0, 100.0), limited("rotation_gain", "1", 0.0, 100.0))
+"""The constants of `Airflow`."""
 ALWAYS_ON: PowerWindows = ((-math.inf, math.inf),)
 
 
@@ -48,8 +56,8 @@ class SelfHeating:
     node: str = "T_electronics"
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.time_constant_s) and self.time_constant_s > 0.0):
-            raise InputError(f"self-heating: time constant is {self.time_constant_s:g} s; it must be > 0")
+        for quantity, value in zip(HEATING, (self.steady_w, self.initial_w, self.time_constant_s)):
+            quantity.check(value, "self-heating")
 
     @property
     def parts(self) -> tuple[float, float, float]:
@@ -85,6 +93,9 @@ class Airflow:
 
     fan_gain: float = 0.0
     rotation_gain: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_all(self, AIRFLOW, "airflow")
 
     def factors(self, fan: FloatArray | None, table_rate: FloatArray | None) -> FloatArray:
         """The factor at each sample, shape (n,); shape (1,) where it never changes."""

@@ -8,10 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from fogml.errors import InputError
 from fogml.twin.inputs import LEADS
 from fogml.twin.plant.network import AIR, ThermalNetwork
-from fogml.twin.quantities import Quantity, shared
+from fogml.twin.quantities import Quantity, check_all, limited, shared
 
 
 @dataclass(frozen=True)
@@ -37,8 +36,7 @@ class ThermalConstants:
     plate_share: float = 0.0
 
     def __post_init__(self) -> None:
-        for quantity in QUANTITIES:
-            quantity.check(getattr(self, quantity.name), "thermal plant")
+        check_all(self, QUANTITIES, "thermal plant")
 
     def as_dict(self) -> dict[str, float]:
         """The constants by name."""
@@ -71,6 +69,8 @@ QUANTITIES: tuple[Quantity, ...] = (
 """The constants of `ThermalConstants` with their units and engineering ranges."""
 
 LARGEST_ORDER = 64
+ORDER = limited("order", "nodes", 1, LARGEST_ORDER, whole=True)
+"""Number of nodes of `standard_network`."""
 
 
 def standard_network(constants: ThermalConstants | None = None, order: int = 6) -> ThermalNetwork:
@@ -104,8 +104,7 @@ def standard_network(constants: ThermalConstants | None = None, order: int = 6) 
     below 1 they leave every other conductance positive.
     """
     c = ThermalConstants() if constants is None else constants
-    if not 1 <= order <= LARGEST_ORDER:
-        raise InputError(f"thermal plant: order is {order}; it lies between 1 and {LARGEST_ORDER}")
+    ORDER.check(order, "thermal plant")
     network = _full(c, max(2, order - 4), order)
     if order < 6:
         capacities = {name: value for name, value in network.capacities.items() if name != "T_plate"}

@@ -1,0 +1,69 @@
+"""Settings of Python callers: each number that can't be is refused where it is set, by its name."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, fields, replace
+from typing import Any
+
+import pytest
+
+from fogml.errors import InputError
+from fogml.gap.grids import Grids
+from fogml.gap.planning.next_run import RepeatSettings
+from fogml.gap.settings import Priors
+from fogml.gap.step_settings import NoiseSettings, Reported, RowSettings, SearchSettings
+from fogml.models.size_priors import SizePriors
+from fogml.monitor.evidence import ChangePrior
+from fogml.runs.thermometers import LimitSettings
+
+KINDS = (
+    *(Priors, RowSettings, NoiseSettings, SearchSettings, Reported, Grids, RepeatSettings),
+    *(SizePriors, ChangePrior, LimitSettings),
+)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_number_is_nan_infinite_text_or_a_flag(kind: Any) -> None:
+    settings = kind()
+    checked = 0
+    for entry in fields(kind):
+        several = isinstance(entry.default, tuple)
+        if entry.default is MISSING or isinstance(entry.default[0] if several else entry.default, str):
+            continue
+        checked += 1
+        for wrong in (math.nan, math.inf, "1", True, None):
+            value = (wrong, *entry.default[1:]) if several else wrong
+            with pytest.raises(InputError, match=f"{kind.__name__}: '{entry.name}' is"):
+                replace(settings, **{entry.name: value})
+        if several:
+            with pytest.raises(InputError, match=r"numbers .* are needed"):
+                replace(settings, **{entry.name: ()})
+    assert checked
+
+
+@pytest.mark.parametrize(
+    "kind, wrong, message",
+    [
+        (Priors, {"sizes": 1}, "a whole number above 1"),
+        (Priors, {"sizes": 2.5}, "a whole number above 1"),
+        (Priors, {"beyond_range": 1.0}, "above 1"),
+        (Priors, {"unknown": 0.0}, "between 0 and 1"),
+        (Priors, {"greatest_size": 3.0}, "'greatest_size' is above 'least_size'"),
+        (RowSettings, {"least_full": 1.1}, "at most 1"),
+        (NoiseSettings, {"white_steps": (1.0, 1.06)}, "some numbers above 1"),
+        (Grids, {"grid_nodes": (9, 5)}, "3 whole numbers above 0"),
+        (Grids, {"periods_degc": (40.0, 1.5)}, "the first is the lower one"),
+        (ChangePrior, {"sizes": (0.0, 1.0)}, "some numbers above 0"),
+        (SizePriors, {"spread": 0.0}, "a number above 0"),
+    ],
+)
+def test_what_a_formula_can_not_take_is_refused(kind: Any, wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        kind(**wrong)
+
+
+def test_what_a_formula_can_take_is_taken() -> None:
+    assert Priors(sizes=2, slow_noise=(-1.0,)).lengths.tolist() == pytest.approx([3.0, 60.0])
+    assert RowSettings(least_full=1).least_full == 1
+    assert ChangePrior().steady().wander == (0.0,)
