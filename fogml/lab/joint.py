@@ -111,7 +111,7 @@ def two_step(turning: Run, rest: Run | None = None, *, order: int = 2, one_sense
     rest
         A run at rest for the bias; the rests of `turning` if None.
     order
-        Order of K(T); lowered where turns are too few.
+        Order of K(T); lowered where turns are at too few temperatures.
     one_sense
         As in `scale_factors`.
 
@@ -121,7 +121,7 @@ def two_step(turning: Run, rest: Run | None = None, *, order: int = 2, one_sense
         If the table never turns, or the bias can't be fitted.
     """
     found = scale_factors(turning, one_sense)
-    degree = min(order, len(found.factor) - 1)
+    degree = min(order, len(np.unique(found.temperature)) - 1)
     span = float(found.temperature.min()), float(found.temperature.max())
     fitted = np.polynomial.Polynomial.fit(found.temperature, found.factor, degree)
     scale = np.asarray(fitted.convert().coef, dtype=np.float64)

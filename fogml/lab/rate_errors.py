@@ -102,6 +102,8 @@ def nonlinearity_within(run: Run, plateaus: Plateaus, scale_factor: float) -> tu
     tuple of float or None
         None for fewer than four rates, or where the outputs hold too little noise to tell it.
     """
+    if len(plateaus.rate) < LEAST_LEVELS:
+        return None
     rates, level = np.unique(merged(plateaus.rate, plateaus.rate_error), return_inverse=True)
     if len(rates) < LEAST_LEVELS:
         return None

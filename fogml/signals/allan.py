@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
-from fogml.intervals import LEVEL
+from fogml.intervals import LEVEL, check_level
 from fogml.signals import large
+from fogml.signals.clock import check_interval
 from fogml.signals.distributions import chi2_ppf
 
 Segments = Iterable[slice | tuple[int, int]]
@@ -104,10 +105,8 @@ def allan_deviation(
     values = np.ascontiguousarray(x, dtype=np.float64)
     if values.ndim != 1:
         raise InputError(f"Allan deviation: one series was expected, found an array of shape {values.shape}")
-    if not (np.isfinite(sample_s) and sample_s > 0):
-        raise InputError(f"Allan deviation: a sample interval of {sample_s} s; it must be positive")
-    if not 0 < level < 1:
-        raise InputError(f"Allan deviation: a level of {level}; it must lie between 0 and 1")
+    check_interval(sample_s, "Allan deviation")
+    check_level(level, "Allan deviation")
     starts, stops = segment_bounds(len(values), segments)
     lengths = stops - starts
     factors = _factors(taus, sample_s, lengths, overlapping)
@@ -120,7 +119,9 @@ def allan_deviation(
 
     from fogml.signals import allan_kernel as kernel
 
-    phases, edges = kernel.phase(values, starts, stops)
+    # Values that are not finite are told below, by what they make of the sums.
+    with np.errstate(invalid="ignore", over="ignore"):
+        phases, edges = kernel.phase(values, starts, stops)
     large.release()
     squares = kernel.second_difference_squares if overlapping else kernel.stepped_second_difference_squares
     sums, counts = squares(phases, edges, factors)

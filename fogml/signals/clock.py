@@ -138,6 +138,12 @@ def told_share(share: Number, least: float) -> Number:
     return (1.0 + q) * g / (g + q)
 
 
+def check_interval(sample_s: float, what: str) -> None:
+    """Refuse a sample interval [s] that is no positive number."""
+    if not (np.isfinite(sample_s) and sample_s > 0.0):
+        raise InputError(f"{what}: a sample interval of {sample_s} s; it must be positive")
+
+
 def check_window(window_s: float, sample_s: float, intervals: int, what: str) -> None:
     """Refuse a window that is no positive number, or shorter than so many sample intervals."""
     if not window_s > 0.0 or not np.isfinite(window_s):

@@ -19,10 +19,12 @@ from itertools import chain, combinations
 import numpy as np
 
 from fogml.arrays import FloatArray, IntArray
+from fogml.errors import InputError
 from fogml.intervals import LEVEL, MEDIAN_SIZE
 from fogml.numerals import percent
 from fogml.signals import large
 from fogml.signals.averages import FastNoise, averages_variance, fast_noise
+from fogml.signals.clock import check_interval
 from fogml.signals.distributions import students_ppf
 from fogml.signals.noise_spectrum import Rows, spectrum_of
 from fogml.signals.output_filters import SpectrumTerms
@@ -198,6 +200,9 @@ def floor_model(
     drifts
         Whether noise that rises like a random walk counts as drift; for a static run it is the gyro's own.
     """
+    check_interval(sample_s, "floor")
+    if not (np.isfinite(averaging_s) and averaging_s > 0.0):
+        raise InputError(f"floor: an averaging time of {averaging_s} s; it must be positive")
     width = max(int(averaging_s / sample_s / PER_WINDOW), 1)
     parts = quiet_parts(values, starts, stops, width)
     stretches = [without_spikes(values[a:b]) for a, b in parts]

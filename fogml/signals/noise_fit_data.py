@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.signals.averages import block_averages
-from fogml.signals.clock import Clock
+from fogml.signals.clock import Clock, check_interval
 from fogml.signals.noise_model import ADJOINING, NoiseModel, flicker_ladder
 from fogml.signals.whitening import Whitener
 
@@ -79,6 +79,8 @@ def fit_data(
 ) -> FitData:
     """Check and reduce the series of a fit; parameters as in `fogml.signals.noise_fit.fit_noise`."""
     times, values, tables = _checked(time, series, columns)
+    if averaging_s is not None:
+        check_interval(averaging_s, "noise fit")
     sample_s = float(averaging_s if averaging_s is not None else Clock(times[0]).sample_s)
     levels: list[Level] = []
     glance: list[Level] = []

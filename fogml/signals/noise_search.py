@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.errors import InputError
 from fogml.signals.distributions import chi2_sf
 from fogml.signals.noise_spectrum import Spectrum
 from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, OutputFilter, SpectrumTerms
@@ -111,10 +112,12 @@ def search_noise(
     correlated
         Whether a Gauss-Markov term competes.
     """
+    if not np.any(spectrum.power > 0.0):
+        raise InputError("noise models: the values are all the same; there is no noise to fit")
     size = np.log(max(float(spectrum.count.sum()), 2.0))
     plain = SpectrumModel(spectrum, PLAIN)
     found = [NoiseChoice(plain, plain.fit(), 0.0)]
-    if filters and np.any(spectrum.power > 0.0):
+    if filters:
         found += _filtered(spectrum, found[0], size)
         best = max(found, key=lambda c: c.evidence)
         if fit_p_value(best.model, best.fit) < misfit_level:

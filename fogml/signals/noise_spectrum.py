@@ -14,7 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
+from fogml.errors import InputError, counted
 from fogml.signals import large
+from fogml.signals.clock import check_interval
 from fogml.signals.cosine import cosine_transform
 from fogml.signals.spectral_lines import SpectralLine, lines_of, one_of_each
 
@@ -125,9 +127,18 @@ def spectrum_of(
         Of a long stretch a function that gives them at some of its rows.
     resolution
         How finely.
+
+    Raises
+    ------
+    InputError
+        If the sample interval is not positive, no stretch has 3 samples, or a value is not finite.
     """
+    check_interval(sample_s, "spectrum")
     fine = resolution or Resolution()
     kept = [i for i, y in enumerate(stretches) if len(y) >= 3]
+    if not kept:
+        longest = max(map(len, stretches), default=0)
+        raise InputError(f"spectrum: the longest stretch has {counted(longest, 'sample')}; it takes 3")
     single = max(min(fine.single, fine.most_single // max(len(kept), 1)), 4)
     lengths = [_good_length(len(stretches[i])) for i in kept]
     total, longest = sum(lengths), max(lengths)
@@ -139,6 +150,8 @@ def spectrum_of(
         (_block_means(tables[i], n, least), _block_means(_rows_of(stretches[i][:, None]), n, least), n)
         for i, n in zip(kept, lengths)
     ]
+    if not all(np.isfinite(means).all() for _, means, _ in coarse):
+        raise InputError("spectrum: values that are not finite; leave them out first")
     told = _told(coarse)
     coarse = [(x * told, means, n) for x, means, n in coarse]
     removed = _least_squares(coarse)

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.intervals import LEVEL
+from fogml.intervals import LEVEL, check_level
 from fogml.signals.allan import AllanResult, allan_deviation
+from fogml.signals.clock import check_interval
 from fogml.signals.noise_search import NoiseSearch, search_noise
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 from fogml.signals.output_filters import AFTER, term_shapes
@@ -157,8 +158,9 @@ def noise_terms(
     Raises
     ------
     InputError
-        If windows do not overlap.
+        If windows do not overlap, or the level is no share.
     """
+    check_level(level, "noise terms")
     if not allan.overlapping:
         raise InputError("noise terms are read from overlapping windows: take overlapping=True")
     if not np.any(spectrum.power > 0.0) or not np.any(allan.adev > 0.0):
@@ -198,6 +200,7 @@ def noise_terms(
 def noise_terms_of(values: FloatArray, sample_s: float, level: float = LEVEL) -> NoiseTerms:
     """As `noise_terms`, of evenly sampled values [deg/h] without gaps, shape (n,)."""
     series = np.asarray(values, dtype=np.float64)
+    check_interval(sample_s, "noise terms")
     ramp = sample_s * np.arange(len(series), dtype=np.float64)[:, None]
     return noise_terms(spectrum_of([series], sample_s, [ramp]), allan_deviation(series, sample_s), level)
 

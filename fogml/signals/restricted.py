@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
 from fogml.arrays import FloatArray
-from fogml.intervals import LEVEL
+from fogml.errors import InputError
+from fogml.intervals import LEVEL, check_level
 from fogml.signals.distributions import normal_ppf, student_ppf, students_ppf
 
 _AT_ONCE = 16
@@ -136,7 +137,7 @@ class RandomEffects:
 
 def random_effects(values: ArrayLike, errors: ArrayLike) -> RandomEffects:
     """Mean and deviation between units of n values with standard errors, by restricted likelihood."""
-    x, se = np.asarray(values, dtype=np.float64), np.asarray(errors, dtype=np.float64)
+    x, se = _told(values, errors, 1)
     if len(x) == 1:
         return RandomEffects(float(x[0]), float(se[0]), float("nan"), 1)
     if not np.all(se > 0.0):
@@ -161,7 +162,8 @@ def next_value(values: ArrayLike, errors: ArrayLike, level: float = LEVEL) -> tu
     Deviations between units are weighed by their restricted likelihood: the likeliest alone is none, often,
     where units differ by no more than their errors.
     """
-    x, se = np.asarray(values, dtype=np.float64), np.asarray(errors, dtype=np.float64)
+    check_level(level, "next value")
+    x, se = _told(values, errors, 2)
     tails = np.array([0.5 - 0.5 * level, 0.5 + 0.5 * level])
     own = float(x.std(ddof=1))
     if own == 0.0 or not np.all(se > 0.0):
@@ -173,6 +175,13 @@ def next_value(values: ArrayLike, errors: ArrayLike, level: float = LEVEL) -> tu
         spreads = np.hypot(between, deviations)
         ends = students_ppf(tails, weights / weights.sum(), means, spreads, np.inf)
     return float(ends[0]), float(ends[1])
+
+
+def _told(values: ArrayLike, errors: ArrayLike, least: int) -> tuple[FloatArray, FloatArray]:
+    x, se = np.asarray(values, dtype=np.float64), np.asarray(errors, dtype=np.float64)
+    if x.shape != se.shape or len(x) < least or not (np.isfinite(x).all() and np.all(se >= 0.0)):
+        raise InputError(f"values of units: {least} or more, finite, with an error each, were expected")
+    return x, se
 
 
 def _between(x: FloatArray, se: FloatArray, deviations: FloatArray) -> tuple[FloatArray, ...]:

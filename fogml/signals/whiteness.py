@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
+from fogml.intervals import check_level
 from fogml.numerals import short
 from fogml.signals import large
+from fogml.signals.clock import check_interval
 from fogml.signals.distributions import chi2_cdf, chi2_sf, variances_sf
 
 _FEWEST_BLOCKS = 8
@@ -79,8 +81,11 @@ def whiteness(
     Raises
     ------
     InputError
-        If there are fewer than 32 innovations, or one is not finite.
+        If there are fewer than 32 innovations, one is not finite, the sample interval is not positive, or the
+        level is no share.
     """
+    check_interval(sample_s, "whiteness")
+    check_level(level, "whiteness")
     series = [np.asarray(part, dtype=np.float64) for part in _parts(innovations)]
     count = sum(len(part) for part in series)
     if count < _FEWEST:
@@ -194,6 +199,7 @@ def stationarity(stretches: Sequence[FloatArray], sample_s: float) -> Stationari
     sample_s
         Sample interval [s].
     """
+    check_interval(sample_s, "stationarity")
     means = [np.asarray(y, dtype=np.float64) for y in stretches]
     found: list[tuple[float, float, tuple[float, ...]]] = []
     tau_s = sample_s

@@ -79,6 +79,11 @@ def test_order_is_lowered_and_temperature_held_where_turns_are_few():
     assert slope == pytest.approx(0.01, rel=0.1)
 
 
+def test_turns_at_one_temperature_tell_no_slope():
+    model = two_step(soaks(temperatures=(20.0, 20.0)), soaks(turns=False))
+    np.testing.assert_allclose(model.scale, [np.polynomial.polynomial.polyval(20.0, SCALE)], 1e-9)
+
+
 def test_figures_tell_bias_and_scale_factor_apart():
     run = soaks()
     full = np.ones(len(run), dtype=bool)

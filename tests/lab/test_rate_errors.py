@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from scipy.stats import t as student
 
 from fogml.arrays import FloatArray
-from fogml.lab.rate_errors import spread_of
+from fogml.lab.rate_errors import nonlinearity_within, spread_of
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_pieces import find_plateaus
 from fogml.lab.rate_temperature import _soaks
@@ -49,6 +49,14 @@ def test_a_long_gap_parts_a_plateau() -> None:
     rows = (run.time < 19.0) | (run.time > 22.0)
     cut = Run("table", {name: values[rows] for name, values in run.columns.items()}, run.facts)
     assert len(find_plateaus(cut)) == len(LADDER) + 1
+
+
+def test_a_run_without_rates_has_no_nonlinearity() -> None:
+    time = np.arange(2.0)
+    run = Run("short", {"time": time, "gyro": time, "rate": 5.0 * time}, Facts())
+    plateaus = find_plateaus(run)
+    assert len(plateaus) == 0
+    assert nonlinearity_within(run, plateaus, 1.0) is None
 
 
 def test_errors_of_the_table_are_in_the_interval() -> None:
