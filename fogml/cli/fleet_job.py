@@ -59,7 +59,7 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     from fogml.report.fleet_page import fleet_page
     from fogml.report.spreadsheets import fleet_spreadsheet
 
-    values = finite_json(fleet_json(outcomes, settings.for_units()))
+    values = finite_json(fleet_json(outcomes, {**settings.for_units(), "prior": settings.prior}))
     batch = batch_of(values["units"], home)
     name = Path(settings.manifest).name
     page = fleet_page(values, name, None if batch is None else "batch.html")
@@ -110,7 +110,7 @@ def _check(settings: FleetSettings, units: Sequence[Unit]) -> None:
 
 def _check_prior(settings: FleetSettings, units: Sequence[Unit]) -> None:
     """Hold that there are models to be drawn to the fleet's, and that nothing else says what they are."""
-    if not any(unit.job == "train" for unit in units):
+    if not any(unit.job == "train" or (unit.job == "acceptance" and unit.train) for unit in units):
         raise InputError("--prior: is for the job 'train', which no unit of the manifest has; leave it out")
     others = {
         "--model": settings.model != "auto",

@@ -64,13 +64,10 @@ class UnitWork:
         with whole_folder(folder) as staging:
             train_runs, test_runs = split_runs(settings, terminal)
             check_belong(unit, (*train_runs, *test_runs))
-            drawn = None
-            if self.shared is not None:
-                from fogml.fleet.shared import shared_model
-
-                drawn = shared_model(self.shared, unit.covariates)
+            drawn = self._drawn(unit)
             model, judgement = fit_and_judge(settings, train_runs, test_runs, terminal, drawn)
-            write_results(staging, settings, model, judgement, terminal)
+            # A model drawn to another fleet's is none that 'fogml train' makes.
+            write_results(staging, settings, model, judgement, terminal, again=drawn is None)
         return {
             **_told(judgement),
             "constants": self._constants(unit, train_runs),
@@ -133,17 +130,26 @@ class UnitWork:
             if not unit.train:
                 return None
             chosen = [self.settings[key] for key in ("model", "features", "seed", "parameters")]
+            unfitted = self._drawn(unit) or make_model(*chosen)
             trained = open_runs(list(unit.train), terminal, repair=settings.repair, axis=settings.axis)
             check_belong(unit, trained)
-            return make_model(*chosen).fit(trained)
+            return unfitted.fit(trained)
 
         values = write_report(settings, terminal, model_of, partial(check_belong, unit))
         return {
-            "model": str(self.settings["model"]) if unit.train else "",
+            "model": ("shared" if self.shared else str(self.settings["model"])) if unit.train else "",
             "met": values["verdict"] in (ACCEPTED, NO_LIMITS),
             "verdict": values["verdict"],
             "notes": values["notes"],
         }
+
+    def _drawn(self, unit: Unit) -> DriftModel | None:
+        """The unit's model, not yet fitted, drawn to an earlier fleet's; None where there is none."""
+        if self.shared is None:
+            return None
+        from fogml.fleet.shared import shared_model
+
+        return shared_model(self.shared, unit.covariates)
 
     def _for(self, kind: Any, unit: Unit, folder: Path, **own: Any) -> Any:
         """Settings of a command: those that it knows of the fleet's, and the unit's own."""

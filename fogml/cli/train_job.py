@@ -173,9 +173,15 @@ def fit(model: DriftModel, runs: list[Run], work: Work) -> DriftModel:
 
 
 def write_results(
-    folder: Path, settings: TrainSettings, model: DriftModel, judgement: Judgement, terminal: Terminal
+    folder: Path,
+    settings: TrainSettings,
+    model: DriftModel,
+    judgement: Judgement,
+    terminal: Terminal,
+    *,
+    again: bool = True,
 ) -> None:
-    """Write model, report, pages, spreadsheet and settings into a folder."""
+    """Write model, report, pages, spreadsheet into a folder; settings, too, if they make it again."""
     from fogml.export.documentation import documentation_or_none
     from fogml.models.saved import save_model
     from fogml.report.certificate import certificate
@@ -191,7 +197,8 @@ def write_results(
         spreadsheet(judgement, folder / "report.xlsx")
         if judgement.limits or judgement.design_index:
             (folder / "certificate.html").write_text(certificate(judgement), encoding="utf-8")
-        settings.write_into(folder, "train")
+        if again:
+            settings.write_into(folder, "train")
 
 
 def _report(settings: TrainSettings, judgement: Judgement) -> dict[str, Any]:

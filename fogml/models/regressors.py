@@ -95,14 +95,24 @@ def for_features(regressor: Any, features: Features, atoms: Sequence[FloatArray]
 
 
 def fit_regressor(regressor: Any, table: TrainingTable) -> Any:
-    """Fit a regressor to a table, telling it runs, times and folds where its fit asks for them."""
+    """Fit a regressor to a table, telling it runs, times and folds where its fit asks for them.
+
+    Raises
+    ------
+    InputError
+        If the rows are none that it can be fitted to: too few, as a rule.
+    """
     asked = inspect.signature(regressor.fit).parameters
     told = {
         "groups": table.run_index,
         "time": table.time_s,
         "folds": table.block % FOLDS,
     }
-    return regressor.fit(table.X, table.y, **{name: told[name] for name in told if name in asked})
+    try:
+        return regressor.fit(table.X, table.y, **{name: told[name] for name in told if name in asked})
+    except ValueError as error:
+        name = type(regressor).__name__
+        raise InputError(f"{name}: can't be fitted to these runs: {first_line(error)}") from None
 
 
 def refit(regressor: Any, table: TrainingTable) -> Any:

@@ -124,11 +124,23 @@ def test_a_fleet_and_the_next_unit_drawn_to_it(invoke, invoke_json, tmp_path):
     assert invoke_json(*arguments, status=1) == values
     assert (tmp_path / "out" / done[0]["folder"] / "report.json").stat().st_mtime_ns == before
     one = "\n".join(lines[:2]) + "\n"
-    (tmp_path / "next.csv").write_text(one)
+    (tmp_path / "next.csv").write_text(one + one.splitlines()[1].replace("train", "acceptance") + "\n")
     drawn = invoke_json(
         "fleet", tmp_path / "next.csv", "--prior", tmp_path / "out" / "fleet.json", "--out", tmp_path / "next"
     )
-    assert drawn["units"][0]["model"] == "shared"
+    assert [unit["model"] for unit in drawn["units"]] == ["shared", "shared"]
+    report_of = json.loads((tmp_path / "next" / drawn["units"][1]["folder"] / "acceptance.json").read_text())
+    assert "shared" in json.dumps(report_of)
+    # What makes the model again says so, and nothing says that 'train' would.
+    own = tmp_path / "next" / drawn["units"][0]["folder"]
+    assert (own / "report.json").is_file() and not (own / "train.config.yaml").exists()
+    again = invoke_json(
+        "fleet", "--config", tmp_path / "next" / "fleet.config.yaml", "--out", tmp_path / "again"
+    )
+    assert again["units"][0]["after"] == drawn["units"][0]["after"]
+    assert drawn["settings"]["prior"] == str(tmp_path / "out" / "fleet.json")
+    whole = tmp_path / "out" / done[0]["folder"] / "train.config.yaml"
+    assert invoke_json("train", "--config", whole, "--out", tmp_path / "one") == report
 
 
 def test_networks_of_a_fleet_are_those_of_train(invoke_json, tmp_path):

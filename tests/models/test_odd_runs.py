@@ -9,7 +9,7 @@ import pytest
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.models.names import make_model
+from fogml.models.names import MODEL_NAMES, make_model
 from fogml.models.saved import load_model, save_model
 from fogml.report.compare_page import compare_page
 from fogml.report.train_page import train_page
@@ -75,6 +75,22 @@ def test_odd_runs_are_judged_with_figures_that_are_finite(
     found = judged.test[0]
     assert np.isfinite([found.before.rms, found.after.rms, found.floor]).all()
     assert "Rms before" in train_page(judged) and "test.csv" in compare_page({"mean": judged})
+
+
+@pytest.mark.parametrize("name", [*MODEL_NAMES, "sklearn.neighbors.KNeighborsRegressor"])
+@pytest.mark.parametrize("rows", [2, 3, 5])
+def test_a_few_rows_are_fitted_or_refused_in_words(name: str, rows: int) -> None:
+    rng = np.random.default_rng(1)
+    T = np.linspace(0.0, 30.0, rows)
+    for gyro, temperature in ((rng.normal(size=rows), T), (np.zeros(rows), np.full(rows, 25.0))):
+        faces = {"T": temperature, "T_in": temperature, "T_out": 1.01 * temperature}
+        run = Run("run.csv", {"time": np.arange(1.0, rows + 1.0), "gyro": gyro, **faces}, FACTS)
+        try:
+            drift = make_model(name).fit([run]).predict(run)
+        except InputError as error:
+            assert "no training row" in str(error) or "can't be fitted" in str(error)
+        else:
+            assert np.isfinite(drift).all()
 
 
 def test_columns_that_nothing_is_computed_of_may_hold_infinite_values() -> None:
