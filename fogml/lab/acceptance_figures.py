@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fogml.errors import InputError, listed
-from fogml.lab.acceptance_rows import TERMS, Limits
+from fogml.lab.acceptance_rows import TERMS, Limit, Limits
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_pieces import earth_deg_h, find_plateaus, merged
 from fogml.numerals import short
@@ -17,7 +17,7 @@ from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
 from fogml.runs.turning import least_rate_deg_s, white_noise
 from fogml.validation.certified import of_10_s, over_temperature
-from fogml.validation.metrics import repeatability_of
+from fogml.validation.metrics import SETTLED_SHARE, repeatability_of
 from fogml.validation.results import Repeatability, RunJudgement, SoakBias, SpreadOverRuns
 from fogml.validation.soaks import (
     EQUAL_TEMPERATURE_DEGC,
@@ -96,7 +96,6 @@ _OF_RUNS = (
     "scale_factor_error",
     "scale_factor_nonlinearity",
     "scale_factor_asymmetry",
-    "turn_on_time",
 )
 """Figures of `fogml.validation.results.Metrics`: of the run that is furthest beyond the limit, or largest."""
 _MOST_NAMES = 3
@@ -110,7 +109,7 @@ class Figure:
     interval of the figure after compensation, where it has one.
     """
 
-    before: float
+    before: float | None
     after: float
     of: str
     remark: str = ""
@@ -147,11 +146,11 @@ def figures_of(
             limit = limits.by_quantity.get(key)
             factors = [_of_few(key, one) for one in told]
             values = [factor * getattr(one.after, key) for factor, one in zip(factors, told, strict=True)]
-            beyond = [0.0 if limit is None else limit.excess(value) for value in values]
-            place = max(range(len(told)), key=lambda one: (beyond[one], abs(values[one])))
+            place = _furthest(values, limit)
             worst = told[place]
             was = factors[place] * getattr(worst.before, key)
             yield key, Figure(was, values[place], worst.run, ci90=_within(key, worst))
+    yield from _turn_on(judged, limits)
     for key, pair in soaks_tell(known_earth(steady)).items():
         if all(getattr(one.after, key) is None for one in judged):
             yield key, Figure(*pair, "all runs together")
@@ -163,6 +162,46 @@ def figures_of(
         yield "scale_factor_repeatability", _repeated(spread.scale_factor, _over(spread))
     yield from _of_rates(before, after)
     yield from _of_noise(before, after, noise)
+
+
+def _furthest(values: Sequence[float], limit: Limit | None) -> int:
+    """Which value is furthest beyond the limit, or largest."""
+    beyond = [0.0 if limit is None else limit.excess(value) for value in values]
+    return max(range(len(values)), key=lambda one: (beyond[one], abs(values[one])))
+
+
+def _turn_on(judged: Sequence[RunJudgement], limits: Limits) -> Iterator[tuple[str, Figure]]:
+    """The longest turn-on time; of a run that does not settle it is at least what comes before its end."""
+    key = "turn_on_time"
+    told = [one for one in judged if one.after.turn_on_time is not None]
+    if not told:
+        return
+    unsettled = {one.run: _unsettled_s(one) for one in told if one.after.turn_on_time == np.inf}
+    times = [unsettled.get(one.run, one.after.turn_on_time or 0.0) for one in told]
+    place = _furthest(times, limits.by_quantity.get(key))
+    worst = told[place]
+    was = worst.before.turn_on_time
+    remarks = [f"the longest of {len(told)} runs"] if len(told) > 1 else []
+    if unsettled:
+        names = listed(unsettled, _MOST_NAMES)
+        remarks.append(f"{names}: not settled within the run, as where its temperature moves")
+    yield (
+        key,
+        Figure(
+            unsettled.get(worst.run) if was == np.inf else was,
+            times[place],
+            worst.run,
+            "; ".join(remarks),
+            at_least=bool(unsettled),
+        ),
+    )
+
+
+def _unsettled_s(run: RunJudgement) -> float:
+    """From power-on to the averages' last quarter [s], in which a run that does not settle is outside."""
+    on, times = run.facts.powered_on or 0.0, run.series.time
+    since = times[times >= on] - on
+    return float(since[len(since) - int(SETTLED_SHARE * len(since)) - 1])
 
 
 def _of_few(key: str, run: RunJudgement) -> float:

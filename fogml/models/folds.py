@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fogml.arrays import BoolArray, IndexArray
-from fogml.errors import InputError
+from fogml.errors import InputError, counted
 
 if TYPE_CHECKING:
     from fogml.models.table import TrainingTable
@@ -63,7 +63,7 @@ def time_folds(
     if folds < 2:
         raise InputError(f"{folds} folds: at least 2 are needed")
     if len(table) < 2:
-        raise InputError(f"{len(table)} training rows: at least 2 are needed for folds of time")
+        raise InputError(f"{counted(len(table), 'training row')}: at least 2 are needed for folds of time")
     labels = np.empty(len(table), dtype=np.intp)
     for number in np.unique(table.run_index):
         rows = np.flatnonzero(table.run_index == number)

@@ -52,6 +52,34 @@ def test_nonlinearity_and_asymmetry_of_rates_that_rise_are_those_of_the_gyro_and
         assert told == pytest.approx(40.0, rel=1e-3)
 
 
+def warming(name, time_constant_s, ramp_deg_h=0.0):
+    time = np.arange(7200.0)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(time))
+    gyro = 0.5 * np.exp(-time / time_constant_s) + ramp_deg_h * time / 7200.0 + noise
+    facts = Facts(unit="u", axis="z", latitude=0.0, input_axis="up", powered_on=0.0)
+    return Run.from_columns(name, facts, time=time, gyro=gyro, T=np.full(len(time), 25.0))
+
+
+def test_turn_on_time_is_the_longest_of_the_runs_and_says_so():
+    quick, slow, drifts = warming("quick", 300.0), warming("slow", 600.0), warming("drifts", 300.0, 1.0)
+
+    def told(*runs, **more):
+        return row(acceptance_json(runs, turn_on_band=0.05, averaging_s=20.0, **more), "turn_on_time")
+
+    one = told(quick)
+    assert one["before"] == pytest.approx(300.0 * np.log(0.5 / 0.05), rel=0.01)
+    assert (one["of"], one["remark"], one["at_least"]) == ("quick", "", False)
+    both = told(quick, slow)
+    assert both["before"] == pytest.approx(600.0 * np.log(0.5 / 0.05), rel=0.01)
+    assert (both["of"], both["remark"]) == ("slow", "the longest of 2 runs")
+    # Half of a ramp's way in the run's last quarter is outside of the band.
+    ends = told(slow, drifts)
+    assert ends["at_least"] and ends["of"] == "drifts" and "drifts: not settled" in ends["remark"]
+    assert ends["before"] == pytest.approx(0.75 * 7200.0, rel=0.01)
+    for limit, met in ((7000.0, None), (5000.0, False)):
+        assert told(drifts, limits=Limits({"turn_on_time": Limit(0.0, limit)}))["met"] is met
+
+
 def test_repeatability_is_of_power_cycles_where_runs_say_so(cycle):
     rng = np.random.default_rng(2)
     bias, scale = 0.02 * rng.standard_normal(6), 8.0 * rng.standard_normal(6)
