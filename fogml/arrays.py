@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,3 +11,11 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
+
+
+def unmasked(values: Any) -> Any:
+    """Values of any kind, of a masked array those that it hides as missing: NaN, of dates NaT."""
+    if not np.ma.isMaskedArray(values):
+        return values
+    missing = values.dtype.type("NaT") if values.dtype.kind in "mM" else np.nan
+    return np.where(np.ma.getmaskarray(values), missing, np.ma.getdata(values))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray, unmasked
 from fogml.errors import InputError
 from fogml.numerals import short
 from fogml.runs.clock_order import Ordered
@@ -110,6 +110,7 @@ def float32_reason(time: FloatArray) -> str | None:
 
 def as_vector(run: str, name: str, values: ArrayLike) -> FloatArray:
     """A column as float64, shape (n,); dates and durations as seconds, dates since the first."""
+    values = unmasked(values)
     array = np.asarray(values)
     if name == "time" and (array.dtype.kind in "mM" or _holds_dates(array)):
         return _seconds(run, values)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fogml.arrays import FloatArray, IntArray
+from fogml.arrays import FloatArray, IntArray, unmasked
 from fogml.errors import InputError
 from fogml.intervals import LEVEL, check_level
 from fogml.signals import large
@@ -102,7 +102,7 @@ def allan_deviation(
         If the sample interval, the level or a time is not positive, values are not finite, or
         no time has two second differences.
     """
-    values = np.ascontiguousarray(x, dtype=np.float64)
+    values = np.ascontiguousarray(unmasked(x), dtype=np.float64)
     if values.ndim != 1:
         raise InputError(f"Allan deviation: one series was expected, found an array of shape {values.shape}")
     check_interval(sample_s, "Allan deviation")

@@ -12,6 +12,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
+from fogml.signals.allan import allan_deviation
 
 TIME = np.arange(600.0)
 
@@ -107,6 +108,19 @@ def test_a_run_is_in_internal_units() -> None:
     assert list(Run("a", columns | {"flow [l/min]": TIME}).columns) == ["time", "gyro", "flow [l/min]"]
     with pytest.raises(InputError, match="gyro_unit is 'deg/s'"):
         Run("a", columns, gyro_unit="deg/s")  # type: ignore[arg-type]
+
+
+def test_what_a_mask_hides_is_missing() -> None:
+    hidden = np.zeros(len(TIME), dtype=bool)
+    hidden[4] = True
+    for name, values in {"gyro": TIME, "T": TIME.astype(int), "time": TIME.astype("m8[s]")}.items():
+        columns = {"time": TIME, "gyro": TIME, name: np.ma.masked_array(values, hidden)}
+        with pytest.raises(InputError, match=f"column '{name}', sample 5: the value is missing"):
+            Run("a", columns)
+        columns[name] = np.ma.masked_array(values, ~hidden & hidden)
+        assert np.array_equal(Run("a", columns).columns[name], TIME)
+    with pytest.raises(InputError, match="not finite"):
+        allan_deviation(np.ma.masked_array(TIME, hidden), sample_s=1.0)
 
 
 def test_a_part_of_a_run_goes_forwards_in_time() -> None:
