@@ -15,8 +15,8 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.escaping import CCode
-from fogml.export.c_flags import slice_comment, slice_inputs, slice_numbers, thermometer_rule
-from fogml.export.c_float import array, box_comment, box_numbers, sensor_identifier
+from fogml.export.c_flags import slice_inputs, slice_numbers, thermometer_rule
+from fogml.export.c_float import TYPES, array, box_lines, edge_lines, sensor_identifier, slice_lines
 from fogml.export.c_own import fixed_number, function_atoms, own_constants, own_context
 from fogml.export.fixed_scales import (
     HELD_BITS,
@@ -87,17 +87,11 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "rates": rates,
         "ratios": rates or bool(plan.centres and plan.edge_columns) or own["divides"],
         "slice_inputs": slice_inputs(plan, scales.atoms),
-        "real": "int64_t",
         "suffix": "",
         "zero": "0",
+        **dict.fromkeys((f"{name}_type" for name in (*TYPES, "held")), "int32_t"),
+        **dict.fromkeys(("real", "value_type", "exp_type"), "int64_t"),
         "temperature_type": "int16_t" if dtype == "q15" else "int32_t",
-        "gyro_type": "int32_t",
-        "atom_type": "int32_t",
-        "signal_type": "int32_t",
-        "value_type": "int64_t",
-        "exp_type": "int64_t",
-        "phase_type": "int32_t",
-        "held_type": "int32_t",
         "units": [*units, *compensated],
         "constants": _constants(plan, windows, scales, dtype),
         "exp_error": EXP_ERROR,
@@ -221,22 +215,16 @@ def _columns(plan: Plan, scales: Scales) -> list[str]:
 def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[str]:
     lines = []
     if plan.atoms:
-        limits, steps = plan.limits, 2.0**scales.atoms
+        steps = 2.0**scales.atoms
         lines += [
             f"#define ATOMS {len(plan.atoms)} /* what features are made of */",
             f"#define COLUMNS {len(plan.steps)} /* features */",
-            "",
-            box_comment(plan),
         ]
-        for name, values, note in box_numbers(limits):
-            whole = np.clip(np.round(values * steps), 1.0 - 2.0**31, 2.0**31 - 1.0)
-            lines += array(name, whole, "int", "[ATOMS]", "int64_t", note)
-        if limits.slices is not None:
+        most = 2.0**31 - 1.0
+        lines += box_lines(plan, lambda x: np.clip(np.round(x * steps), -most, most), "int", "int64_t")
+        if plan.limits.slices is not None:
             numbers = slice_numbers(plan, scales.atoms)
-            lines += slice_comment(plan)
-            lines += [f"#define SLICE_{name.upper()} INT64_C({numbers[name]})" for name in ("first", "width")]
-            for name in ("low", "high"):
-                lines += array(f"SLICE_{name.upper()}", numbers[name], "int", "[SLICED][SLICES]", "int64_t")
+            lines += slice_lines(plan, numbers, "INT64_C({})".format, "int", "int64_t")
     lines += own_constants(plan, windows, fixed_number, "int64_t")
     if windows.binned and windows.lines:
         lines.append(f"#define WEIGHT_UNITS INT64_C({weight_units(windows)}) /* of a full bin in a slope */")
@@ -311,11 +299,5 @@ def _network_constants(plan: Plan, scales: Scales, stored: str) -> list[str]:
     if plan.edge_columns:
         lines.append(f"#define SLOPE_SHIFT {scales.weight_bits + spare - scales.drift + 19}")
         steps = 2.0 ** scales.columns[list(plan.edge_columns)]
-        lines += [
-            "",
-            f"#define EDGES {len(plan.edge_columns)} /* columns that hold a rate, and their trained range */",
-            *array("EDGE_COLUMN", plan.edge_columns, "int", "[EDGES]", "int"),
-            *array("EDGE_LOW", np.round(plan.edge[0] * steps), "int", "[EDGES]", "int64_t"),
-            *array("EDGE_HIGH", np.round(plan.edge[1] * steps), "int", "[EDGES]", "int64_t"),
-        ]
+        lines += edge_lines(plan, np.round(plan.edge * steps), "int", "int64_t")
     return lines

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from math import factorial, log
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, quoted
@@ -14,7 +15,7 @@ from fogml.escaping import CCode, c_text
 from fogml.export.c_flags import slice_comment, slice_inputs, slice_numbers, thermometer_rule
 from fogml.export.c_own import function_atoms, own_constants, own_context
 from fogml.export.layout import RANGE_BITS, Layout
-from fogml.export.plan import Limits, Plan
+from fogml.export.plan import Plan
 from fogml.features.atoms import DEAD_BAND
 from fogml.features.own import Function
 from fogml.features.signal import Signal, unit_of
@@ -22,6 +23,8 @@ from fogml.runs.columns import is_temperature
 
 OTHER_LIMIT = 1e15
 """Values of other columns than temperatures up to this size, in their units, are taken."""
+TYPES = ("temperature", "gyro", "atom", "signal", "value", "exp", "phase")
+"""What has a type of its own in C."""
 EXP_TERMS = {"float64": 13, "float32": 7}
 EXP_MOST = {"float64": 700.0, "float32": 80.0}
 EXP_ERROR = {"float64": 4e-16, "float32": 2e-7}
@@ -74,19 +77,12 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     temperature = "[degC], in the order of the places below" if plain else "in the order and units below"
     gyro = f"[{plan.gyro_unit}]" if plan.gives_rate else "output as rate [deg/h]"
     return {
+        **dict.fromkeys(("real", *(f"{name}_type" for name in TYPES)), real),
         "fixed": None,
         "slice_inputs": slice_inputs(plan),
-        "real": real,
         "suffix": suffix,
         "zero": "0.0" + suffix,
         "second_us": number(1e-6),
-        "temperature_type": real,
-        "gyro_type": real,
-        "atom_type": real,
-        "signal_type": real,
-        "value_type": real,
-        "exp_type": real,
-        "phase_type": real,
         "held_type": "int64_t" if real == "double" else "int32_t",
         "units": [
             *units_of(plan, gyro, temperature),
@@ -206,34 +202,48 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
         band = number(DEAD_BAND * (1.0 + 1e-9))
         lines.append(f"#define DEAD_BAND {band} /* rates up to this count as standing still [degC/min] */")
     if plan.atoms:
-        limits = plan.limits
-        lines += ["", box_comment(plan)]
-        for name, values, note in box_numbers(limits):
-            lines += array(name, values, dtype, "[ATOMS]", real, note)
-        if limits.slices is not None:
-            numbers = slice_numbers(plan)
-            lines += slice_comment(plan)
-            lines += [f"#define SLICE_{name.upper()} {number(numbers[name])}" for name in ("first", "width")]
-            for name in ("low", "high"):
-                lines += array(f"SLICE_{name.upper()}", numbers[name], dtype, "[SLICED][SLICES]", real)
+        lines += box_lines(plan, lambda values: values, dtype, real)
+        if plan.limits.slices is not None:
+            lines += slice_lines(plan, slice_numbers(plan), number, dtype, real)
     lines += own_constants(plan, windows, number, real)
     return [CCode(line) for line in (*lines, "", *_model_constants(plan, dtype, real))]
 
 
-def box_comment(plan: Plan) -> str:
-    """The line above the trained box."""
-    return f"/* The trained box, by atom: {c_text(', '.join(atom.text for atom in plan.atoms))}. */"
-
-
-def box_numbers(limits: Limits) -> tuple[tuple[str, FloatArray, str], ...]:
-    """The constants of the trained box: name, values by atom, and what they are for."""
-    return (
+def box_lines(plan: Plan, stored: Callable[[FloatArray], FloatArray], dtype: str, kind: str) -> list[str]:
+    """Lines of the trained box, by atom, as numbers are `stored`."""
+    limits, names = plan.limits, c_text(", ".join(atom.text for atom in plan.atoms))
+    lines = ["", f"/* The trained box, by atom: {names}. */"]
+    for name, values, note in (
         ("LOW", limits.low, "values below are levelled off"),
         ("HIGH", limits.high, "values above are levelled off"),
         ("MARGIN", limits.margin, "how far beyond a levelled value gets"),
         ("INNER", limits.inner, "values below are flagged"),
         ("OUTER", limits.outer, "values above are flagged"),
-    )
+    ):
+        lines += array(name, stored(values), dtype, "[ATOMS]", kind, note)
+    return lines
+
+
+def slice_lines(
+    plan: Plan, numbers: Mapping[str, Any], number: Callable[[Any], str], dtype: str, kind: str
+) -> list[str]:
+    """Lines of the trained ranges in slices of a temperature, of `slice_numbers`."""
+    lines = slice_comment(plan)
+    lines += [f"#define SLICE_{name.upper()} {number(numbers[name])}" for name in ("first", "width")]
+    for name in ("low", "high"):
+        lines += array(f"SLICE_{name.upper()}", numbers[name], dtype, "[SLICED][SLICES]", kind)
+    return lines
+
+
+def edge_lines(plan: Plan, edge: NDArray[Any], dtype: str, kind: str) -> list[str]:
+    """Lines of the columns that hold a rate, with their trained range, shape (2, r)."""
+    return [
+        "",
+        f"#define EDGES {len(plan.edge_columns)} /* columns that hold a rate, and their trained range */",
+        *array("EDGE_COLUMN", plan.edge_columns, "int", "[EDGES]", "int"),
+        *array("EDGE_LOW", edge[0], dtype, "[EDGES]", kind),
+        *array("EDGE_HIGH", edge[1], dtype, "[EDGES]", kind),
+    ]
 
 
 def _model_constants(plan: Plan, dtype: str, real: str) -> list[str]:
@@ -255,15 +265,7 @@ def _model_constants(plan: Plan, dtype: str, real: str) -> list[str]:
         *array("INVERSE_WIDTH", 1.0 / arrays["widths"], dtype, "[CENTRES][INPUTS]", real),
         *array("WEIGHT", arrays["weights"], dtype, "[CENTRES]", real, "[deg/h]"),
     ]
-    if plan.edge_columns:
-        lines += [
-            "",
-            f"#define EDGES {len(plan.edge_columns)} /* columns that hold a rate, and their trained range */",
-            *array("EDGE_COLUMN", plan.edge_columns, "int", "[EDGES]", "int"),
-            *array("EDGE_LOW", plan.edge[0], dtype, "[EDGES]", real),
-            *array("EDGE_HIGH", plan.edge[1], dtype, "[EDGES]", real),
-        ]
-    return lines
+    return [*lines, *(edge_lines(plan, plan.edge, dtype, real) if plan.edge_columns else ())]
 
 
 def _exponential(dtype: str) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 from collections.abc import Mapping, Sequence
+from itertools import dropwhile, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -261,8 +262,9 @@ def _told(done: Finished) -> str:
     return terminal_text(done.errors.strip()[:500])
 
 
-_EMULATED_CPU = "cortex-a15"
-# It knows all that a Cortex-M4's code is made of, and programs of Linux besides.
+_SECTIONS = ("-ffunction-sections", "-Wl,--gc-sections")
+_EMULATION = ("-cpu", "cortex-a15", "-singlestep", "-d", "exec,nochain")
+# That knows all that a Cortex-M4's code is made of, and programs of Linux besides.
 
 
 def instructions_per_sample(source: CSource, folder: Path) -> int | None:
@@ -276,46 +278,17 @@ def instructions_per_sample(source: CSource, folder: Path) -> int | None:
     write_files({**source.files, "probe.c": source.probe}, folder)
     program = folder / "probe.elf"
     flags = [flag for flag in FLAGS if flag not in ("-O2", "-Wpedantic", "-Werror")]
-    if not _done(
-        [
-            compiler,
-            *CORTEX_M4,
-            *flags,
-            "-O2",
-            "-DFOGML_NO_SELF_TEST",
-            "-ffreestanding",
-            *("-nostdlib", "-ffunction-sections", "-Wl,--gc-sections"),
-            str(folder / "probe.c"),
-            "-lgcc",
-            "-o",
-            str(program),
-        ]
-    ):
-        return None
     trace = folder / "trace"
-    words = [
-        emulator,
-        "-cpu",
-        _EMULATED_CPU,
-        "-singlestep",
-        "-d",
-        "exec,nochain",
-        "-D",
-        str(trace),
-        str(program),
-    ]
-    if not _done(words):
+    alone = ("-O2", "-DFOGML_NO_SELF_TEST", "-ffreestanding", "-nostdlib", *_SECTIONS)
+    compiling = [*CORTEX_M4, *flags, *alone, str(folder / "probe.c"), "-lgcc", "-o", str(program)]
+    counting = [*_EMULATION, "-D", str(trace), str(program)]
+    if not (_done([compiler, *compiling]) and _done([emulator, *counting])):
         return None
-    count, counting = 0, False
     with trace.open(encoding="ascii", errors="replace") as lines:
-        for line in lines:
-            if not counting:
-                counting = re.search(r"\bcount_begin$", line.rstrip()) is not None
-            elif line.rstrip().endswith("count_end"):
-                break
-            else:
-                count += 1
-    return round(count / COUNTED) if count else None
+        behind = dropwhile(lambda line: not re.search(r"\bcount_begin$", line.rstrip()), lines)
+        within = takewhile(lambda line: not line.rstrip().endswith("count_end"), behind)
+        count = sum(1 for _ in within) - 1  # less the line that begins
+    return round(count / COUNTED) if count > 0 else None
 
 
 def _done(words: Sequence[str]) -> bool:
