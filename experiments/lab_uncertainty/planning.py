@@ -67,8 +67,8 @@ class Bench:
 
     def __init__(self, case: Promise) -> None:
         self.case, self.twin = case, load_twin("tactical")
-        own = self.twin.noise
-        noise = NoiseModel(own.N, own.B, own.K)
+        white = self.twin.noise
+        noise = NoiseModel(white.N, white.B, white.K)
         self.values = {n: c for n, c in vars(self.twin.nominal).items() if isinstance(c, float)}
         sensors = self.twin.sensors if case.thermometers else Sensors()
         self.on: Stage = stage(replace(self.twin, sensors=sensors), noise, self.values)
@@ -77,11 +77,12 @@ class Bench:
         rows = self.rehearsal.rows
         self.kept, self.acting = rows.kept, Replayer(rows.run)
         self.whitener = whitener_of(noise, rows)
-        self.noise = Noise(own.N, own.B, own.K)
+        self.noise = Noise(white.N, white.B, white.K)
         setting = Setting(
             Scene((rows,), 1, self.twin.grade), self.on.model.constants, STANDARD, (), self.values
         )
-        self.missed = fixed_columns(setting, 0, self.on.model.twin)[:, len(self.constants) :]
+        own = replace(self.on.model.twin, sensors=sensors)
+        self.missed = fixed_columns(setting, 0, own)[:, len(self.constants) :]
         self.missed_white = self._whiten(self.missed)
 
     def _whiten(self, values: FloatArray) -> FloatArray:

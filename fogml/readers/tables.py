@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, datetime, time, timedelta
 from functools import partial
-from itertools import chain, pairwise, repeat
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -161,9 +161,8 @@ class Workbook(Container):
             self.hidden = [s.name for s in book.sheets_metadata if s.visible != SheetVisibleEnum.Visible]
             for name in sorted(book.sheet_names, key=self.hidden.__contains__):
                 held = book.get_sheet_by_name(name)
-                # Rows above the first cell count, as they do in the program that shows them.
-                above = repeat((), (held.start or (0, 0))[0])
-                sheet = Sheet(self.spool, chain(above, held.iter_rows()))
+                # From the first row, as in the program that shows them, though nothing stands in it.
+                sheet = Sheet(self.spool, held.iter_rows())
                 if not sheet.is_empty:
                     self.add("", name, None, sheet)
 

@@ -18,7 +18,7 @@ from fogml.runs.clock_order import in_order
 from fogml.runs.columns import TIME_ON, column_spec, conversion, parse_header
 from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
-from fogml.runs.header_spelling import face_of
+from fogml.runs.header_spelling import column_meant, face_of
 from fogml.runs.other_rate import on_gyro_rows
 from fogml.runs.possible import (
     REPAIR,
@@ -265,6 +265,9 @@ def _internal_columns(
         raise SeveralAxes(table.file, axes)
     for name in ("time", "gyro"):
         if name not in columns:
+            for other, unit in map(parse_header, table.cells):
+                if unit is not None and column_meant(other) == name:
+                    conversion(name, unit, table.file)
             found = _listed(seen)
             raise InputError(
                 f"{table.file}: no column '{name}'; a run needs time and gyro, e.g. 'time [s]', "

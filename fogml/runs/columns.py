@@ -47,7 +47,8 @@ _SPELLINGS = {
     "Gy": ("gray",),
 }
 _CANONICAL = {word.lower(): unit for unit, words in _SPELLINGS.items() for word in (unit, *words)}
-_HALVES = {"hour": "h", "hr": "h", "hrs": "h", "second": "s", "sec": "s", "degrees": "deg", "degree": "deg"}
+_HALVES = {"hour": "h", "hr": "h", "hrs": "h", "second": "s", "sec": "s", "degrees": "deg", "degree": "deg",
+           "小时": "h", "时": "h", "分": "min", "秒": "s", "度": "deg", "弧度": "rad"}  # fmt: skip
 _PLAIN_UNIT = re.compile(r"[A-Za-z_]{1,20}(/[A-Za-z_]{1,20})?\Z")
 # What pint calls the units that the run format writes otherwise.
 _OF_PINT = {"g": "standard_gravity", "G": "gauss", "%": "percent", "degC": "degree_Celsius", "h": "hour"}
@@ -256,6 +257,11 @@ def conversion(name: str, unit: str | None, file: str) -> tuple[float, float]:
         raise InputError(f"{file}: column '{name}' states no unit; {how} (accepted: {accepted})")
     found = spec.units.get(unit) or converted(unit, spec.internal)
     if found is None:
+        if _AMBIGUOUS.match(unit):
+            raise InputError(
+                f"{file}: column '{name}' has unit {quoted(unit)}, degrees in German and gon elsewhere; "
+                f"write {_AMBIGUOUS.sub('deg', unit)} where it is degrees (accepted: {accepted})"
+            )
         angle = converted(unit, "deg") if spec.internal in ("deg/h", "deg/s") else None
         raise InputError(
             f"{file}: column '{name}' has unit {quoted(unit)}, not accepted here; "

@@ -24,7 +24,7 @@ _WARM = ("temp", "temperature", "temperatur")
 _DATE_AND_TIME = (("date", "and", "time"), ("datum", "und", "zeit"), ("datum", "und", "uhrzeit"),
                   ("日期", "和", "时间"))  # fmt: skip
 _SYNONYMS = {
-    "time": ("t", "timestamp", "elapsed", "elapsedtime", "zeit", "uhrzeit", "zeitstempel", "时间",
+    "time": ("t", "timestamp", "elapsed", "elapsedtime", "zeit", "uhrzeit", "zeitstempel", "时间", "采样时间",
              "indexlevel0",
              *(d + mark + t for d, word, t in _DATE_AND_TIME for mark in ("", "/", ",", word))),
     "gyro": ("gyroscope", "gyrooutput", "gyrorate", "fog", "fogoutput", "fograte", "omega", "ω",
@@ -53,6 +53,7 @@ _OF_AN_AXIS = re.compile(r"(?:gyro?|gyroscope|omega|angular(?:rate|velocity)|[gw
 _FORM_OF_TIMES = re.compile(
     r"(?=.*[:y])(?:[ymdhs]{1,4}|f{1,9})(?:[-/.:, t]+(?:[ymdhs]{1,4}|f{1,9}))+\Z", re.IGNORECASE
 )
+_PARENTHESES = str.maketrans("（）", "()")
 _BLANKS = re.compile(r"\s{2,}")
 _NUMBER = re.compile(r"[-+\d.,:' ]+\Z")
 _COMMENT = re.compile(r"\s*(#|%|//)+\s*")
@@ -110,6 +111,11 @@ def face_of(name: str) -> str | None:
     return None if rest else found[0]
 
 
+def column_meant(name: str) -> str | None:
+    """The column of the run format that a name spells, or a word means, whatever its unit."""
+    return _SPELLED.get(_plain(name)) or _meant(name)
+
+
 def _meant(name: str) -> str | None:
     """The column of the run format that a word means; a face of the coil only where the coil is named."""
     plain = _plain(name)
@@ -158,7 +164,8 @@ def _parts(cell: str) -> tuple[str, str | None]:
     for text, of_it in _splits(signs(cell)):
         if _meant(text) is not None and of_it is not None and is_unit(of_it):
             return text, of_it
-    if (match := _FORMS[0].match(cell)) and match["name"] and is_unit(match["unit"]):
+    plain = cell.translate(_PARENTHESES)
+    if (match := _FORMS[0].match(plain)) and match["name"] and is_unit(match["unit"]):
         return match["name"], canonical_unit(match["unit"])
     return name, unit
 

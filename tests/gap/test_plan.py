@@ -19,7 +19,7 @@ from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.registry import effect
 from fogml.twin.replay import Replayer
-from fogml.twin.set_up import Sensors
+from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.twin_file import load_twin
 
 TWIN = replace(load_twin("nominal"), sensors=Sensors())
@@ -149,6 +149,33 @@ def test_expected_errors_are_those_of_fits_whose_prior_is_the_plan(rehearsed):
     # At the plan's own width it would be less; the size's is that.
     alone = np.sqrt(np.diag(np.linalg.inv(information(rehearsal, of))))[list(of.wanted)]
     assert width > 1.2 * alone[1] and size == pytest.approx(alone[0])
+
+
+def test_what_the_lag_of_sensors_hides_is_no_part_of_what_is_promised():
+    """A lag known to within its own size is one more unknown, whose response is a replay of late readings."""
+    values = {**VALUES, "k1": 12.0}
+    exact, late = (
+        Rehearsal(stage(replace(TWIN, sensors=s), NOISE, values, facts=FACTS), Family(), SHORT, FINE_S)
+        for s in (Sensors(), Sensors(common=SensorErrors(lag=10.0)))
+    )
+    of = unknowns(exact.stage, ["k1"])
+    rows, twin = exact.rows, exact.stage.model.twin.with_nominal(k1=12.0)
+    run, time = rows.run, rows.run.time
+
+    def white_of_late(name):
+        moved = np.interp(time - 1.0, time, run.columns[name])
+        outputs = [Replayer(r).output(twin) for r in (run.with_columns(**{name: moved}), run)]
+        return exact._whitener.whiten((outputs[0] - outputs[1])[rows.kept])
+
+    hidden = np.column_stack([exact.nuisances, *(10.0 * white_of_late(n) for n in ("T_in", "T_out"))])
+    white = responses(exact, of)
+    table = np.column_stack([white, hidden])
+    prior = np.diag(np.append(np.diag(of.prior_information()), np.ones(hidden.shape[1])))
+    wanted = np.sqrt(np.diag(np.linalg.inv(table.T @ table + prior)))[: white.shape[1]]
+    told = np.sqrt(np.diag(expected(late, of)))
+    np.testing.assert_allclose(told, wanted, rtol=0.02)
+    (k1,) = of.wanted
+    assert told[k1] > 1.5 * np.sqrt(np.diag(expected(exact, of)))[k1]
 
 
 def test_no_shape_is_expected_to_be_told_worse_than_beforehand(rehearsed):

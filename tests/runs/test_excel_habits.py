@@ -357,3 +357,17 @@ def test_a_date_with_time_at_midnight_is_no_bare_date(tmp_path, first):
     book.save(tmp_path / "night.xlsx")
     run = read_run(tmp_path / "night.xlsx")
     np.testing.assert_allclose(run.time - run.time[0], np.arange(12.0), atol=1e-6)
+
+
+@pytest.mark.parametrize("above", [0, 4])
+def test_a_line_of_a_workbook_is_the_row_that_its_program_shows(tmp_path, above):
+    book = openpyxl.Workbook()
+    for i, cells in enumerate(
+        [["time [s]", "gyro [deg/h]"], *([float(t), 9.0 + 0.1 * (t % 3)] for t in range(40))]
+    ):
+        for place, value in enumerate(cells):
+            book.active.cell(above + 1 + i, 3 + place, value)
+    book.active.cell(above + 20, 4, "kaputt")
+    book.save(tmp_path / "low.xlsx")
+    with pytest.raises(InputError, match=f"low.xlsx, line {above + 20}, column 'gyro': 'kaputt'"):
+        read_run(tmp_path / "low.xlsx")

@@ -212,3 +212,16 @@ def test_a_clock_without_a_unit_is_told_by_what_its_steps_would_be(tmp_path, ste
     path = tmp_path / "log.csv"
     path.write_text("Zeit,Kreisel,Temp\n" + "".join(f"{step * i},{i % 7},{20 + i}\n" for i in range(50)))
     assert told in draft_profile(path)
+
+
+@pytest.mark.parametrize(
+    ("cell", "factor"), [("Drehrate in Grad/s", 3600.0), ("Gyro [Grad/h]", 1.0), ("wx_rad", 648000.0 / np.pi)]
+)
+def test_a_guess_of_the_gyros_unit_goes_by_what_the_cell_says(tmp_path, cell, factor) -> None:
+    """Grad is no radian: the guess of a file of German headers was 57 or 3600 times off."""
+    path, profile = tmp_path / "log.csv", tmp_path / "profile.yaml"
+    path.write_text(f"Zeit [s];{cell};T [°C]\n" + "".join(f"{i};{i % 7},25;{20 + i}\n" for i in range(50)))
+    profile.write_text(draft_profile(path))
+    assert "GUESS" in profile.read_text()
+    (run,) = import_recording(path, profile)
+    np.testing.assert_allclose(run.gyro, factor * (np.arange(50) % 7 + 0.25), rtol=1e-12)

@@ -42,8 +42,28 @@ def test_multiples_of_hours_and_minutes_are_slips(unit: str, internal: str) -> N
 @pytest.mark.parametrize("unit", ["Grad/h", "grad/s", "rps", "mrps"])
 def test_units_of_two_meanings_are_refused(unit: str) -> None:
     """Grad is a degree in German and 0.9 of one elsewhere; rps is radians or revolutions a second."""
-    with pytest.raises(InputError, match="not accepted here"):
+    told = f"write {unit.lower().replace('grad', 'deg')} where" if "rad" in unit else "not accepted here"
+    with pytest.raises(InputError, match=told):
         conversion("gyro", canonical_unit(unit), "log.csv")
+
+
+def test_units_in_chinese_are_those_of_their_signs(tmp_path) -> None:
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{i},{7200.5 + i % 3},{25 + 0.1 * i}\n" for i in range(40))
+    path.write_text(
+        "采样时间（毫秒），陀螺（度/小时），温度（℃）\n".replace("，", ",") + rows, encoding="gbk"
+    )
+    run = read_run(path)
+    np.testing.assert_allclose(run.time, 1e-3 * np.arange(40.0))
+    np.testing.assert_allclose(run.gyro, 7200.5 + np.arange(40) % 3)
+    assert [canonical_unit(u) for u in ("度/秒", "弧度/秒", "°/小时")] == ["deg/s", "rad/s", "deg/h"]
+
+
+def test_a_gyro_whose_unit_is_none_is_told_by_its_unit(tmp_path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("Time [s],Gyro [Grad/h]\n" + "".join(f"{i},{7.5 + i % 3}\n" for i in range(40)))
+    with pytest.raises(InputError, match="'Grad/h', degrees in German and gon elsewhere; write deg/h"):
+        read_run(path)
 
 
 def test_a_point_after_an_abbreviation_is_no_part_of_the_name() -> None:

@@ -162,7 +162,8 @@ class Rehearsal(ExpectedRuns):
         self._weights = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
         scene = Scene((rows,), 1, on.model.grade)
         setting = Setting(scene, model.constants, STANDARD, (), on.values)
-        fixed = fixed_columns(setting, 0, model.twin)
+        # How late the unit's sensors are is as little known to a fit of the run as it is to a diagnosis.
+        fixed = fixed_columns(setting, 0, replace(model.twin, sensors=on.sensors))
         white, count = self._whiten(fixed), len(model.constants)
         super().__init__(on, white[:, :count], white[:, count:])
 
