@@ -281,13 +281,9 @@ def _gyro(one: _Field | None, many: bool) -> str:
     if one.unit is not None and is_accepted("gyro", one.unit):
         return f"{{{source}unit: {_quoted(one.unit)}}}"
     values = one.numbers
-    hints = (
-        ("deg/h", r"dph|deg_?h|grad ?/ ?h"),
-        ("deg/s", r"dps|deg_?s|grad ?/ ?s"),
-        ("rad/s", r"(?<!g)rad"),
-    )
-    text = f"{one.name} {one.unit or ''}"
-    unit = next((u for u, hint in hints if re.search(hint, text, re.IGNORECASE)), None)
+    hints = (("deg/h", r"dph|deg_?h|grad/h"), ("deg/s", r"dps|deg_?s|grad/s"), ("rad/s", r"(?<!g)rad"))
+    text = f"{one.name} {one.unit or ''}".lower()
+    unit = next((u for u, hint in hints if re.search(hint, text)), None)
     if unit is None and len(values) and np.all(values == np.round(values)):
         unit, why = "count", "whole numbers; with 'scale: 1/K' it may be deg/s or deg/h"
     else:
