@@ -196,11 +196,23 @@ def _cell(value: Any) -> str:
         return str(int(value))
     if isinstance(value, float):
         return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+    if isinstance(value, date) and value.year == 1900:
+        return _hours(value)
     if isinstance(value, datetime):
         return value.isoformat(" ")
     if isinstance(value, timedelta):
         return repr(value.total_seconds())
     return value.isoformat() if isinstance(value, date | time) else str(value)
+
+
+_DAY_0 = datetime(1899, 12, 31)
+
+
+def _hours(value: date) -> str:
+    """A date of 1900, which a cell of hours becomes from a day on, as hours, minutes and seconds."""
+    moment = value if isinstance(value, datetime) else datetime.combine(value, time())
+    minutes, rest = divmod(moment - _DAY_0, timedelta(minutes=1))
+    return f"{minutes // 60}:{minutes % 60:02}:{rest.seconds:02}.{rest.microseconds:06}"
 
 
 class Tdms(Container):

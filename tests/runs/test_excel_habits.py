@@ -371,3 +371,20 @@ def test_a_line_of_a_workbook_is_the_row_that_its_program_shows(tmp_path, above)
     book.save(tmp_path / "low.xlsx")
     with pytest.raises(InputError, match=f"low.xlsx, line {above + 20}, column 'gyro': 'kaputt'"):
         read_run(tmp_path / "low.xlsx")
+
+
+@pytest.mark.parametrize("header", ["Elapsed", "Elapsed [s]", "Elapsed [min]", "Time"])
+@pytest.mark.parametrize("shown", ["h:mm:ss", "mm:ss.0"])
+@pytest.mark.parametrize("step_s", [600.5, 3600.0, 40_000.5])
+def test_a_cell_of_hours_minutes_and_seconds_goes_on_past_a_day(tmp_path, header, shown, step_s):
+    """As a date of 1900, which a program of tables makes of it."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append([header, "Gyro (deg/h)"])
+    seconds = np.arange(100) * step_s
+    for i, elapsed in enumerate(seconds):
+        sheet.append([elapsed / 86400.0, 9.0 + 0.1 * (i % 3)])
+        sheet.cell(i + 2, 1).number_format = shown
+    book.save(tmp_path / "book.xlsx")
+    run = read_run(tmp_path / "book.xlsx")
+    np.testing.assert_allclose(run.time, seconds, atol=1e-5)

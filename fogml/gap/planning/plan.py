@@ -48,7 +48,10 @@ from fogml.twin.nominal import NAMES
 from fogml.twin.twin import Twin
 
 MOST_PLANNED = 8
-_EXACT = "table rate and clock are exact, and the plant, the noise and the constants' priors are the twin's"
+_EXACT = (
+    "table rate and clock are exact, so that noise alone limits what acts at edges of the rate, such as a "
+    "skew of the clock; the plant, the noise and the constants' priors are the twin's"
+)
 
 
 @dataclass(frozen=True)
