@@ -21,8 +21,6 @@ SINE_SHARE = 0.95
 """Share of the rate's square that a sine explains of an oscillation; of turns to and fro it is 8 / pi**2."""
 ROUND_OFF_DEG_H = 1e-6
 """Rates that differ by less are the same."""
-_BAND = 0.05
-_SAME_CYCLE = 0.2
 _NOISES = 6.0
 """Steps of the recorded rate beyond so many of its own noise are steps of the table."""
 
@@ -163,18 +161,30 @@ def merged(values: FloatArray, error: FloatArray) -> FloatArray:
     return out
 
 
-def find_oscillations(run: Run) -> list[Oscillation]:
-    """Stretches in which the table's rate is a sine about rest, each at one frequency."""
+def find_oscillations(run: Run, *, band: float = 0.05, same_cycle: float = 0.2) -> list[Oscillation]:
+    """Stretches in which the table's rate is a sine about rest, each at one frequency.
+
+    Parameters
+    ----------
+    run
+        With the table's rate.
+    band
+        Share of the greatest rate within which the table is at rest: above a rate's noise and offset, and
+        far below the amplitude of any wave in the run, which may differ by ten.
+    same_cycle
+        Change of the length of a cycle, in its logarithm, from which on the frequency is another: above the
+        error of crossings that are told to a sample or two, below steps of a test, a third of an octave.
+    """
     time, rate = run.time, run.rate
     # A wave passes zero at a good pace; noise about rest does so within a band.
-    band = _BAND * float(np.abs(rate).max(initial=0.0))
-    outside = np.flatnonzero(np.abs(rate) > band)
+    rest = band * float(np.abs(rate).max(initial=0.0))
+    outside = np.flatnonzero(np.abs(rate) > rest)
     rising = np.flatnonzero((rate[outside[:-1]] < 0.0) & (rate[outside[1:]] > 0.0))
     below, above = outside[rising], outside[rising + 1]
     # Linear between the samples on both sides.
     at = time[below] + (time[above] - time[below]) * -rate[below] / (rate[above] - rate[below])
     cycle = np.diff(at)
-    cuts = np.flatnonzero(np.abs(np.diff(np.log(cycle))) > _SAME_CYCLE) + 1
+    cuts = np.flatnonzero(np.abs(np.diff(np.log(cycle))) > same_cycle) + 1
     found = []
     for piece in np.split(np.arange(len(cycle)), cuts):
         if len(piece) < LEAST_CYCLES:

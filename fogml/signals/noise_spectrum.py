@@ -15,6 +15,7 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted
+from fogml.settings_check import check_numbers
 from fogml.signals import large
 from fogml.signals.clock import check_interval
 from fogml.signals.cosine import cosine_transform
@@ -46,6 +47,13 @@ class Resolution:
         Bins in an octave of frequency above them: S may change by a tenth in one.
     line_chance
         Chance of taking noise for a line, of the whole spectrum.
+    line_fewest
+        Coefficients of a bin in which lines are looked for: the median of fewer is known worse than to 40 %.
+        Bins of a sixteenth of an octave hold as many up to periods of a 361st of the stretch; slower
+        sinusoids are not looked for, and count as noise.
+    line_near
+        Coefficients on either side whose median a line's are compared with: few, as a density that is steep
+        or has zeros is no line, and more than a line covers.
     collinear
         Share of the greatest singular value of the columns, each of length 1, from which a direction is told.
         Thermometers of one make whose readings agree to a few counts differ by more; what is below is the
@@ -56,7 +64,16 @@ class Resolution:
     most_single: int = 1024
     per_octave: int = 16
     line_chance: float = 1e-3
+    line_fewest: int = 32
+    line_near: int = 50
     collinear: float = 1e-5
+
+    def __post_init__(self) -> None:
+        check_numbers(self, chances=("line_chance",), shares=("collinear",))
+
+    def slowest_line_s(self, stretch_s: float) -> float:
+        """Longest period of a sinusoid that is looked for in a stretch so long [s]."""
+        return 2.0 * stretch_s * (2.0 ** (1.0 / self.per_octave) - 1.0) / self.line_fewest
 
 
 @dataclass(frozen=True)
@@ -182,7 +199,10 @@ def spectrum_of(
         first = at[used]
         if not len(used):
             continue
-        masked, found = lines_of(square, at, sample_s, n, alone + 1, fine.line_chance / total)
+        chance = fine.line_chance / total
+        masked, found = lines_of(
+            square, at, sample_s, n, alone + 1, chance, fewest=fine.line_fewest, near=fine.line_near
+        )
         lines.append((n, found))
         if masked is not None:
             square[masked] = 0.0

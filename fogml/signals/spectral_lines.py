@@ -11,10 +11,10 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.signals.distributions import chi2_isf, chi2_ppf, variances_isf
 
-_NEAR = 50
-"""Coefficients on either side whose median a line's are compared with."""
-_TOLD = 0.37
-"""Degrees of freedom of a median of squares, per square: twice their median's share in its variance."""
+_TYPICAL = float(chi2_ppf(0.5, 1))
+_TOLD = 4.0 / np.pi * _TYPICAL * np.exp(-_TYPICAL)
+"""Degrees of freedom of a median of squares of normal values, per square: a chi-square of as many has the
+relative variance ``1 / (4 n (m f(m))**2)`` of the median m of n squares of density f, chi-square of 1."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,15 @@ class SpectralLine:
 
 
 def lines_of(
-    square: FloatArray, edges: IntArray, sample_s: float, n: int, offset: int, chance: float
+    square: FloatArray,
+    edges: IntArray,
+    sample_s: float,
+    n: int,
+    offset: int,
+    chance: float,
+    *,
+    fewest: int = 32,
+    near: int = 50,
 ) -> tuple[BoolArray | None, list[SpectralLine]]:
     """Coefficients of sinusoids that stand out of their bins' noise, and what they are.
 
@@ -42,6 +50,8 @@ def lines_of(
         Samples of the stretch, and the number of the first coefficient.
     chance
         Of taking a coefficient of noise for a line.
+    fewest, near
+        As `line_fewest` and `line_near` of `fogml.signals.noise_spectrum.Resolution`.
 
     Returns
     -------
@@ -49,12 +59,12 @@ def lines_of(
         Which coefficients are a line's, None where there are none, and the lines.
     """
     # Median and limit of a squared normal value.
-    typical, limit = float(chi2_ppf(0.5, 1)), float(chi2_isf(chance, 1))
+    typical, limit = _TYPICAL, float(chi2_isf(chance, 1))
     masked: BoolArray | None = None
     lines: list[SpectralLine] = []
     for low, high in pairwise(edges.tolist()):
         # A median of few, or of one side of a line, says nothing.
-        if high - low < 32:
+        if high - low < fewest:
             continue
         part = square[low:high]
         top = int(np.argmax(part))
@@ -68,8 +78,8 @@ def lines_of(
             masked = np.zeros(len(square), dtype=np.bool_)
         for place in low + np.flatnonzero(part > limit * level):
             # A density that is steep or has zeros is no line: its neighbours are as large.
-            near = square[max(place - _NEAR, 0) : place + _NEAR + 1]
-            least = variances_isf(chance, 1, _TOLD * len(near)) * float(np.median(near)) / typical
+            beside = square[max(place - near, 0) : place + near + 1]
+            least = variances_isf(chance, 1, _TOLD * len(beside)) * float(np.median(beside)) / typical
             if masked[place] or square[place] <= least:
                 continue
             a = b = int(place)

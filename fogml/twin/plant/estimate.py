@@ -17,8 +17,6 @@ from fogml.twin.plant.heat import ALWAYS_ON, PowerWindows, windows_since
 from fogml.twin.plant.network import AIR, PlantState, ThermalNetwork
 from fogml.twin.truth import read_time_on
 
-_ON_SHARE = 0.2
-
 
 @dataclass
 class EstimateState:
@@ -86,12 +84,19 @@ def estimate_nodes(
     return {**solved, **boundary, **known}
 
 
-def recorded_power(run: Run) -> PowerWindows:
+def recorded_power(run: Run, on_share: float = 0.2) -> PowerWindows:
     """When the unit was on: from ``time_on`` of a simulated run, else from ``power`` or ``supply`` and facts.
 
-    On is above a fifth of the largest value that two neighbouring samples reach; a column that is never above
-    0 tells nothing. A unit that is on at the first sample was switched on at the fact ``powered_on``, or long
-    before where that is not stated.
+    A column that is never above 0 tells nothing. A unit that is on at the first sample was switched on at the
+    fact ``powered_on``, or long before where that is not stated.
+
+    Parameters
+    ----------
+    run
+        A recording.
+    on_share
+        Share of the largest value that two neighbouring samples reach from which on the unit is on: a warm
+        unit draws less than one that starts, and a meter's offset or a stand-by far less than either.
     """
     if TIME_ON in run.columns and len(run):
         return windows_since(run.time, read_time_on(run.columns[TIME_ON]))
@@ -103,7 +108,7 @@ def recorded_power(run: Run) -> PowerWindows:
     held = np.isfinite(column)
     time, column = run.time[held], column[held]
     # A reading that stands alone is a spike.
-    on = column > _ON_SHARE * np.minimum(column[1:], column[:-1]).max(initial=column.min())
+    on = column > on_share * np.minimum(column[1:], column[:-1]).max(initial=column.min())
     changes = time[1:][np.diff(on.astype(np.int8)) != 0].tolist()
     edges = [
         *([min(earlier, float(time[0]))] if on[0] else []),
