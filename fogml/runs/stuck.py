@@ -14,9 +14,9 @@ from fogml.runs.thermometers import resolution
 from fogml.signals import large
 
 STUCK_S = 600.0
-"""A sensor that shows one value for longer [s] may be stuck."""
+"""A sensor that shows one value for longer [s] may be stuck; less far behind another is any sound one."""
 MOVED_DEGC = 0.5
-"""What another sensor must have moved by meanwhile [degC], at least."""
+"""What another sensor must have gone away by [degC], at least, and twice the sensor's resolution."""
 MOVED_DEG_S = 0.1
 """What the table's rate must have changed by meanwhile [deg/s]: more than any dead zone is wide."""
 FROZEN_SAMPLES = 60
@@ -48,7 +48,12 @@ def stuck(run: Run) -> Iterator[Finding]:
                 continue
         others = [run.temperature(other) for other in temperatures if other != name]
         found = [
-            i for i, (a, b) in enumerate(zip(starts, stops)) if any(np.ptp(x[a:b]) > least for x in others)
+            i
+            for i, (a, b) in enumerate(zip(starts, stops))
+            if any(
+                np.ptp(x[a:b]) > least if name == "gyro" else _left(run.time[a:b], x[a:b], values[a], least)
+                for x in others
+            )
         ]
         if found:
             first, last = int(starts[found[0]]), int(stops[found[0]]) - 1
@@ -62,6 +67,16 @@ def stuck(run: Run) -> Iterator[Finding]:
             if name == "gyro":
                 return
     yield from _frozen(run)
+
+
+def _left(time: FloatArray, other: FloatArray, value: float, least: float) -> bool:
+    """Whether another thermometer leaves a value, or passes through it, and stays away for long.
+
+    In a soak one that has settled stays while others come to it, and, for its lag, when they leave it.
+    """
+    off = other - value if other[0] >= value else value - other
+    away = np.flatnonzero((off > off[0] + least) | (off < -least))
+    return len(away) > 0 and bool(time[-1] - time[away[0]] > STUCK_S)
 
 
 def _frozen(run: Run) -> Iterator[Finding]:

@@ -11,6 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from fogml.runs.checks import check_run
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import Run
+from fogml.signals.bases import lag
 
 
 def temperature(time, amplitude=20.0):
@@ -314,6 +315,27 @@ class TestStuckSensors:
         columns["rate"] = turning(20_000, 0.1)
         columns["gyro"] = np.round(columns["gyro"] * (columns["rate"] != 0.0) + 3600.0 * columns["rate"])
         assert "stuck_sensor" not in codes(columns)
+
+    @pytest.mark.parametrize("resolution", [0.01, 0.1, 0.5])
+    @pytest.mark.parametrize("behind_s", [0.0, 300.0])
+    def test_a_coarse_sensor_that_settles_in_soaks_is_not_stuck(self, resolution, behind_s):
+        # Soaks of two hours at -20, 50 and 25 degC; the case is 900 s behind the chamber, the coil further.
+        time = 2.0 * np.arange(19_000)
+        corners = [0, 7200, 8550, 15_750, 19_950, 27_150, 30_150, 38_000]
+        chamber = np.interp(time, corners, [25, 25, -20, -20, 50, 50, 25, 25])
+        case = lag(time, chamber, 900.0)
+        columns = {
+            "T_chamber": chamber,
+            "T_case": case,
+            "T_in": lag(time, case, behind_s) if behind_s else case,
+        }
+        columns = {name: resolution * np.round(values / resolution) for name, values in columns.items()}
+        columns |= {"time": time, "gyro": np.random.default_rng(0).standard_normal(len(time))}
+        assert "stuck_sensor" not in codes(columns)
+        for start, stop in ((3800, 6000), (4100, 5000), (8000, 19_000)):
+            frozen = columns["T_in"].copy()
+            frozen[start:stop] = frozen[start]
+            assert one({**columns, "T_in": frozen}, "stuck_sensor").column == "T_in"
 
     def test_a_sensor_dead_all_along(self):
         columns = noisy()
