@@ -11,11 +11,6 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.signals.distributions import chi2_isf, chi2_ppf, variances_isf
 
-_TYPICAL = float(chi2_ppf(0.5, 1))
-_TOLD = 4.0 / np.pi * _TYPICAL * np.exp(-_TYPICAL)
-"""Degrees of freedom of a median of squares of normal values, per square: a chi-square of as many has the
-relative variance ``1 / (4 n (m f(m))**2)`` of the median m of n squares of density f, chi-square of 1."""
-
 
 @dataclass(frozen=True)
 class SpectralLine:
@@ -59,7 +54,8 @@ def lines_of(
         Which coefficients are a line's, None where there are none, and the lines.
     """
     # Median and limit of a squared normal value.
-    typical, limit = _TYPICAL, float(chi2_isf(chance, 1))
+    typical, limit = float(chi2_ppf(0.5, 1)), float(chi2_isf(chance, 1))
+    freedom = median_freedom()
     masked: BoolArray | None = None
     lines: list[SpectralLine] = []
     for low, high in pairwise(edges.tolist()):
@@ -79,7 +75,7 @@ def lines_of(
         for place in low + np.flatnonzero(part > limit * level):
             # A density that is steep or has zeros is no line: its neighbours are as large.
             beside = square[max(place - near, 0) : place + near + 1]
-            least = variances_isf(chance, 1, _TOLD * len(beside)) * float(np.median(beside)) / typical
+            least = variances_isf(chance, 1, freedom * len(beside)) * float(np.median(beside)) / typical
             if masked[place] or square[place] <= least:
                 continue
             a = b = int(place)
@@ -97,6 +93,16 @@ def lines_of(
             frequency = (offset + middle) / (2.0 * n * sample_s)
             lines.append(SpectralLine(frequency, float(np.sqrt(max(energy.sum(), 0.0) / (sample_s * n)))))
     return masked, lines
+
+
+def median_freedom() -> float:
+    """Degrees of freedom of a median of squares of normal values, per square.
+
+    A chi-square of as many has the relative variance ``1 / (4 n (m f(m))**2)`` of the median m of n squares
+    of density f, chi-square of 1.
+    """
+    middle = float(chi2_ppf(0.5, 1))
+    return float(4.0 / np.pi * middle * np.exp(-middle))
 
 
 def one_of_each(
