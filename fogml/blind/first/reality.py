@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.blind.first.effects import coil, electrical, invented, sensing, turning
-from fogml.blind.first.noise import NoiseConstants, draw_instruments, draw_noise, draw_series, sense
+from fogml.blind.first.noise import NoiseConstants, draw_instruments, draw_noise, draw_series, finer, sense
 from fogml.blind.first.plant import (
     CASE,
     ELECTRONICS,
@@ -197,7 +197,7 @@ def draw_unit(
     demands = draw_demands(rng, forms, {"turns": 0.4, "power_steps": 0.3, "fan_stops": 0.15}, (10.0, 80.0))
     slope, turning_slope = nominal.temperature_slopes(constants, sample_s)
     turning_slope *= demands.top_rate * float(demands.turns and not demands.small_rates)
-    instruments = instruments.finer(slope, turning_slope, noise.N / np.sqrt(sample_s / 3600.0))
+    instruments = finer(instruments, slope, turning_slope, noise.N / np.sqrt(sample_s / 3600.0))
 
     def run(name: str, programme: Programme, of: NoiseConstants, place: int) -> UnitRun:
         world = happen(rng, plant, programme, set_up, sample_s, place)

@@ -39,8 +39,12 @@ class Instruments:
 
     Attributes
     ----------
-    layout, others, noise, resolution
-        As `fogml.blind.frame.unit.Thermometers` has them.
+    layout
+        Sensors on the coil: ``one`` for T, ``two`` for T_in and T_out, ``four`` for T1 to T4.
+    others
+        Further columns of the run format that are recorded.
+    noise, resolution
+        Of the temperature sensors [degC].
     each
         Thermometers by recorded name.
     """
@@ -60,6 +64,13 @@ class Instruments:
     def two_faces(self) -> bool:
         """Whether there is a sensor on the outer face."""
         return self.layout != "one"
+
+
+def places_of(layout: str, others: Sequence[str]) -> dict[str, str]:
+    """Where each thermometer sits, by recorded name: on a face of the coil, or where its name says."""
+    coil = {"one": ("T",), "two": ("T_in", "T_out"), "four": ("T1", "T2", "T3", "T4")}[layout]
+    faces = {name: "T_out" if name in OUTER else "T_in" for name in coil}
+    return faces | {name: name for name in others if name.startswith("T_")}
 
 
 def draw_instruments(
@@ -84,16 +95,13 @@ def draw_instruments(
     most = min(_AT_REST * white / (rest + 1e-30), _IN_TURNS * white / (turning + 1e-30))
     error = min(float(np.exp(rng.uniform(np.log(1e-3), np.log(8e-3)))) * (0.3 if fine else 1.0), most)
     steps = [q for q in (0.02, 0.01, 0.005, 0.002, 0.001, 1e-4) if q < 2.0 * error]
-    coil = {"one": ("T",), "two": ("T_in", "T_out"), "four": ("T1", "T2", "T3", "T4")}[layout]
-    places = {name: "T_out" if name in OUTER else "T_in" for name in coil}
-    places |= {name: name for name in others if name.startswith("T_")}
 
     def thermometer(name: str, place: str) -> Thermometer:
-        lag = 2.0 if name in coil else 10.0
+        lag = 10.0 if name in others else 2.0
         gain, offset = rng.normal(0.0, 1e-3), rng.normal(0.0, 0.1)
         return Thermometer(place, float(gain), float(offset), float(lag * rng.uniform(0.2, 1.0)))
 
-    each = {name: thermometer(name, place) for name, place in places.items()}
+    each = {name: thermometer(name, place) for name, place in places_of(layout, others).items()}
     instruments = Instruments(layout, tuple(others), error, max(steps, default=1e-5), each)
     if not instruments.two_faces:
         constants = nominal.Constants(**(constants.as_dict() | {"g": 0.0}))
@@ -120,16 +128,18 @@ class Sensed:
         return {name: (1.0 + each[name].gain) * x + each[name].offset for name, x in held.items()}
 
 
-def slower(instruments: Instruments, factor: float) -> Instruments:
-    """The same thermometers with all their lags times a factor."""
-    each = {name: replace(one, lag_s=factor * one.lag_s) for name, one in instruments.each.items()}
-    return replace(instruments, each=each)
-
-
 def sense(rng: np.random.Generator, world: World, instruments: Instruments) -> Sensed:
     """The thermometers of one run."""
     noise = {name: instruments.noise * rng.standard_normal(len(world.time)) for name in instruments.each}
     return Sensed(felt_by(instruments, world), noise, instruments)
+
+
+def recorded_run(
+    rng: np.random.Generator, name: str, world: World, instruments: Instruments, noise: StateNoise
+) -> UnitRun:
+    """A run of what happened, with the noise of its thermometers and of the gyro."""
+    series = noise.series(rng, len(world.time), world.sample_s)
+    return UnitRun(name, world, sense(rng, world, instruments), series, int(rng.integers(2**62)))
 
 
 def felt_by(instruments: Instruments, world: World) -> dict[str, FloatArray]:
@@ -138,11 +148,10 @@ def felt_by(instruments: Instruments, world: World) -> dict[str, FloatArray]:
     return {name: late(world.nodes[one.place], one.lag_s, world.sample_s) for name, one in each}
 
 
-def quick_enough(unit: Unit, instruments: Instruments) -> Unit:
+def quick_enough(unit: Unit) -> Unit:
     """The unit with thermometers so quick that what their lag alone does to a replay is lost in the noise."""
 
     def falsified(run: UnitRun) -> FloatArray:
-        assert isinstance(run.sensed, Sensed)
         replayed = nominal.output(unit.constants, unit.seen(run, run.sensed.exact()))
         missed = unit.output(run) - replayed
         return missed[unit.skipped :]
@@ -150,10 +159,11 @@ def quick_enough(unit: Unit, instruments: Instruments) -> Unit:
     length = Scales(unit).projected().length([falsified(run) for run in unit.fit])
     if length <= _LAG_D_PRIME:
         return unit
-    quicker = slower(instruments, 0.8 * _LAG_D_PRIME / length)
+    factor = 0.8 * _LAG_D_PRIME / length
+    each = {name: replace(one, lag_s=factor * one.lag_s) for name, one in unit.instruments.each.items()}
+    quicker = replace(unit.instruments, each=each)
 
     def again(run: UnitRun) -> UnitRun:
-        assert isinstance(run.sensed, Sensed)
         return replace(run, sensed=Sensed(felt_by(quicker, run.world), run.sensed.noise, quicker))
 
     return replace(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,49 +15,8 @@ from fogml.blind.frame.form import Form
 from fogml.blind.frame.noise import NoiseLaw, Whitening
 from fogml.blind.frame.record import SetUp, World
 
-
-class Thermometers(Protocol):
-    """What a unit's thermometers are.
-
-    Attributes
-    ----------
-    layout
-        Sensors on the coil: ``one`` for T, ``two`` for T_in and T_out, ``four`` for T1 to T4.
-    others
-        Further columns of the run format that are recorded.
-    noise, resolution
-        Of the temperature sensors [degC].
-    """
-
-    @property
-    def layout(self) -> str: ...
-
-    @property
-    def others(self) -> tuple[str, ...]: ...
-
-    @property
-    def noise(self) -> float: ...
-
-    @property
-    def resolution(self) -> float: ...
-
-    @property
-    def coil(self) -> dict[str, str]:
-        """Recorded coil sensors to the face each sits on."""
-
-    @property
-    def two_faces(self) -> bool:
-        """Whether there is a sensor on the outer face."""
-
-
-class Readings(Protocol):
-    """What a run's thermometers feel before noise and rounding, by recorded name [degC]."""
-
-    @property
-    def felt(self) -> dict[str, FloatArray]: ...
-
-    def recorded(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
-        """Recorded columns; of other `felt` temperatures with the same noise, if given."""
+if TYPE_CHECKING:
+    from fogml.blind.frame.thermometers import Instruments, Sensed
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +35,7 @@ class UnitRun:
 
     name: str
     world: World
-    sensed: Readings
+    sensed: Sensed
     noise: FloatArray
     seed: int
 
@@ -104,7 +63,7 @@ class Unit:
     plant: Any
     constants: nominal.Constants
     noise: NoiseLaw
-    instruments: Thermometers
+    instruments: Instruments
     set_up: SetUp
     earth_stated: bool
     sample_s: float
@@ -176,13 +135,9 @@ def faces(recorded: dict[str, FloatArray], layout: str) -> tuple[FloatArray, Flo
     return 0.5 * (recorded["T1"] + recorded["T3"]), 0.5 * (recorded["T2"] + recorded["T4"])
 
 
-class DrawUnit(Protocol):
-    """Draws a unit with its runs."""
-
-    def __call__(
-        self, rng: np.random.Generator, forms: Sequence[type[Form]], runs: int, static: bool, sample_s: float
-    ) -> Unit:
-        """A unit whose programmes and instruments show the forms; `runs` to fit on, one held out."""
+DrawUnit = Callable[[np.random.Generator, Sequence[type[Form]], int, bool, float], Unit]
+"""Draws a unit whose programmes and instruments show forms, with so many runs to fit on and one held out,
+a static one if asked for, at a sample interval [s]."""
 
 
 @dataclass(frozen=True)

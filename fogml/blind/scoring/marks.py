@@ -8,7 +8,7 @@ structure is what is wrong. A case that failed is a wrong answer in every figure
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -155,10 +155,10 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
         items=items,
         suspected=tuple(judged(item) for item in gap.suspected),
         unknown=gap.unknown.probability,
-        **asdict(standing),
+        **standing,
         overlap=_overlap(truth, gap),
         closed_ratios=_closed_ratios(truth, gap),
-        closed_covered=_closed_covered(truth, gap) if standing.exact and not truth.unknown else (),
+        closed_covered=_closed_covered(truth, gap) if standing["exact"] and not truth.unknown else (),
         amplitude_covered=_amplitude_covered(truth, gap.which),
         seconds=answer.seconds,
         samples=answer.samples,
@@ -167,27 +167,18 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
     )
 
 
-@dataclass(frozen=True)
-class _Standing:
-    """How a list of items stands to the truth; attributes as those of `Mark`."""
-
-    exact: bool
-    top: bool
-    top_strict: bool
-    kept: bool
-
-
-def _standing(truth: Truth, items: tuple[Judged, ...]) -> _Standing:
+def _standing(truth: Truth, items: tuple[Judged, ...]) -> dict[str, bool]:
+    """How a list of items stands to the truth, by attributes of `Mark`."""
     known = {effect.id for effect in truth.known if effect.id}
     named = [item for item in items if item.named]
     kept = known <= {id for item in named for id in item.members}
     first = items[0] if items else None
-    return _Standing(
-        exact=bool(known) and kept and all(item.right for item in named),
-        top=first is not None and bool(known & set(first.members)),
-        top_strict=first is not None and first.effect in known,
-        kept=kept,
-    )
+    return {
+        "exact": bool(known) and kept and all(item.right for item in named),
+        "top": first is not None and bool(known & set(first.members)),
+        "top_strict": first is not None and first.effect in known,
+        "kept": kept,
+    }
 
 
 def _overlap(truth: Truth, gap: Gap) -> float | None:

@@ -16,7 +16,7 @@ from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Form, draw_demands, draw_set_up, forms_in
 from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.record import Course, SetUp, World
-from fogml.blind.frame.thermometers import draw_instruments, quick_enough, sense
+from fogml.blind.frame.thermometers import draw_instruments, quick_enough, recorded_run
 from fogml.blind.frame.unit import Reality, Unit, UnitRun
 from fogml.blind.second.effects import driven, lasting, turning, unknown, winding
 from fogml.blind.second.plant import NAMES, Plant, draw_plant
@@ -194,8 +194,7 @@ def draw_unit(
 
     def run(name: str, programme: Programme, of: StateNoise, place: int) -> UnitRun:
         world = happen(rng, plant, chamber, programme, set_up, sample_s, place, begin, past)
-        series = of.series(rng, len(world.time), sample_s)
-        return UnitRun(name, world, sense(rng, world, instruments), series, int(rng.integers(2**62)))
+        return recorded_run(rng, name, world, instruments, of)
 
     names = [*(f"fit-{k + 1}.csv" for k in range(runs)), "held-out-1.csv"]
     thermal = []
@@ -223,7 +222,7 @@ def draw_unit(
         shown=tuple(name for name in instruments.others if name in thermal[0].world.drives),
         first_day=stated.replace(microsecond=0) if rng.random() < 0.7 else None,
     )
-    return quick_enough(unit, instruments)
+    return quick_enough(unit)
 
 
 def _remembered(past: tuple[float, ...], world: World) -> tuple[float, ...]:

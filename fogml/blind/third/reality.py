@@ -14,7 +14,7 @@ from fogml.blind.frame.form import Demands, Form, forms_in
 from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.operators import late
 from fogml.blind.frame.record import Course, SetUp, World
-from fogml.blind.frame.thermometers import draw_instruments, quick_enough, sense
+from fogml.blind.frame.thermometers import draw_instruments, quick_enough, recorded_run
 from fogml.blind.frame.unit import Reality, Unit, UnitRun
 from fogml.blind.third.effects import driven, winding
 from fogml.blind.third.plant import NAMES, Plant, draw_plant
@@ -241,8 +241,7 @@ def draw_unit(
 
     def run(name: str, programme: Programme, of: StateNoise, place: int) -> UnitRun:
         world = happen(rng, plant, programme, set_up, sample_s, place, begin, past)
-        series = of.series(rng, len(world.time), sample_s)
-        return UnitRun(name, world, sense(rng, world, instruments), series, int(rng.integers(2**62)))
+        return recorded_run(rng, name, world, instruments, of)
 
     thermal = []
     for place in range(runs + 1):
@@ -271,7 +270,7 @@ def draw_unit(
         shown=tuple(name for name in instruments.others if name in thermal[0].world.drives),
         first_day=first_day if rng.random() < 0.5 else None,
     )
-    return quick_enough(unit, instruments)
+    return quick_enough(unit)
 
 
 KNOWN = forms_in(winding, driven)
