@@ -9,6 +9,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, with_config
 
 import fogml
@@ -157,7 +158,7 @@ def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
     Raises
     ------
     InputError
-        If there is none, one is empty, or they don't belong together.
+        If there is none, one is empty or there twice, or they don't belong together.
     """
     group = runs_of(runs)
     if not group:
@@ -165,6 +166,10 @@ def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
     for run in group:
         if len(run) == 0:
             raise InputError(f"{run.name}: holds no samples; leave it out of training")
+    for place, run in enumerate(group):
+        for other in group[:place]:  # left out, it would be judged by itself
+            if np.array_equal(run.gyro, other.gyro) and np.ptp(run.gyro) > 0.0:
+                raise InputError(f"{run.name}: the same samples as {other.name}; give each run once")
     for fact in ("unit", "axis"):
         stated = {getattr(run.facts, fact): run.name for run in group if getattr(run.facts, fact) is not None}
         if len(stated) > 1:

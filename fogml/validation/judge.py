@@ -127,7 +127,7 @@ def judgement_of(
         check_noise_run(noise)
     judged_train = tuple(judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise) for e in train)
     judged_test = tuple(
-        judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise, _seen(e.run, train_runs))
+        judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise, _seen(e.run, train_runs, model))
         for e in test
     )
     return Judgement(
@@ -162,16 +162,19 @@ def _within(errors: RunErrors, models: Sequence[DriftModel]) -> RunErrors:
     return errors
 
 
-def _seen(run: Run, train: Sequence[Run]) -> tuple[Finding, ...]:
-    """Whether a test run holds samples of a training run, on whatever clock."""
+def _seen(run: Run, train: Sequence[Run], model: DriftModel) -> tuple[Finding, ...]:
+    """Whether a test run holds samples of a training run, on whatever clock, or is one by the card."""
     known: dict[str, float] = run.__dict__.setdefault(_SHARED, {})  # models are judged on the same runs
     for other in train:
         if other.hash not in known:
             known[other.hash] = shared_samples(run.gyro, other.gyro)
-        if share := known[other.hash]:
+    shares = [(other.name, known[other.hash]) for other in train]
+    shares += [(trained.name, 1.0) for trained in model.card_.runs if trained.sha256 == run.hash]
+    for name, share in shares:
+        if share:
             what = "the same samples as" if share == 1.0 else f"samples of (about {percent(share, 0)})"
             message = (
-                f"holds {what} training run {other.name}: its figures say how well the model was fitted, "
+                f"holds {what} training run {name}: its figures say how well the model was fitted, "
                 "not how well it holds"
             )
             return (Finding("seen_in_training", message, count=round(share * len(run))),)

@@ -111,3 +111,16 @@ def test_runs_shorter_than_the_windows_are_refused_with_what_to_do() -> None:
     columns = {"time": time, "gyro": rng.normal(size=900), "T_in": T, "T_out": T + rng.normal(size=900)}
     with pytest.raises(InputError, match="give longer runs, or state shorter windows"):
         make_model("auto").fit([Run("short.csv", columns, FACTS)])
+
+
+@pytest.mark.parametrize("name", ["auto", "polynomial", "mean"])
+def test_a_run_is_given_once(name: str) -> None:
+    """Left out, a run that is there twice would be judged by itself: intervals of half the width."""
+    rng = np.random.default_rng(2)
+    T = 25.0 + 20.0 * np.sin(np.arange(400) * 60.0 / 3000.0)
+    first, second = (run_of(0.02 * T + 0.1 * rng.normal(size=400), T, 60.0, f"{n}.csv") for n in "ab")
+    later = Run("copy.csv", {**first.columns, "time": first.time + 7.0}, FACTS)
+    make_model(name).fit([first, second])
+    for twice in (first, later):
+        with pytest.raises(InputError, match=r"the same samples as a\.csv; give each run once"):
+            make_model(name).fit([first, second, twice])

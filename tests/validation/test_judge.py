@@ -151,6 +151,13 @@ def test_a_test_run_that_was_trained_on_is_said():
     assert [finding.code for finding in run.findings] == ["seen_in_training"]
 
 
+def test_a_run_of_the_models_card_is_told_though_it_is_not_named_as_a_training_run():
+    first, second, third = (ramp_run(f"{name}.csv", 0.1 * i) for i, name in enumerate("abc"))
+    model = make_model("polynomial", "T").fit([first, second])
+    told = [judge(model, first, run).test[0].findings for run in (second, third)]
+    assert [[finding.code for finding in found] for found in told] == [["seen_in_training"], []]
+
+
 def test_series_for_the_figures():
     train = ramp_run("a.csv", 0.0)
     (run,) = judge(KnownDrift(slope_law, half_width=0.3).fit(train), train, train).test
@@ -235,6 +242,7 @@ def test_samples_of_a_training_run_are_told_though_cut_and_on_another_clock(star
 
 
 def test_outputs_that_stand_still_alike_are_not_taken_for_the_same_samples():
-    train, test = (Run(name, {**ramp_run(name, 0.3).columns, "gyro": np.full(4000, 0.3)}) for name in "ab")
+    train = Run("a", {**ramp_run("a", 0.3).columns, "gyro": np.full(4000, 0.3)})
+    test = Run("b", {**train.columns, "T": train.columns["T"] + 1.0})
     (run,) = judge(KnownDrift(slope_law).fit(train), train, test).test
     assert not any(finding.code == "seen_in_training" for finding in run.findings)
