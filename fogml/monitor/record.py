@@ -35,6 +35,10 @@ FIGURES = {
 """Figures of what a model leaves on a run, with their units."""
 LEAST_WINDOWS = 16
 """Averages that a run needs: as many as a fit of its noise does."""
+_SETTLING = (
+    "and most samples come before the model's memories are settled (a lag after three time constants, a play "
+    "once T has moved by twice its half width); record so, or watch with a model without memory"
+)
 
 
 @dataclass(frozen=True)
@@ -165,7 +169,7 @@ def record_run(
             f"{averaging_s:g} s; set --averaging to that interval or more"
         )
     time, mean = recording.means.values()
-    used, is_inside = _used(mean, first.name, averaging_s)
+    used, is_inside = recording.used(mean, first.name, averaging_s)
     recording.hold_usable(is_inside, most_spoilt)
     half = mean["half"][used]
     told = run_figures(
@@ -211,7 +215,7 @@ class _Recording:
         self.means = _Means(averaging_s)
         self.columns: dict[str, hashlib._Hash] = {}
         self.first: Run | None = None
-        self.samples = self.outside = 0
+        self.samples = self.outside = self.unsettled = 0
         self.last_s = 0.0
         self.low, self.high = np.inf, -np.inf
         self.spoilt: list[Finding] = []
@@ -228,6 +232,7 @@ class _Recording:
             self.columns.setdefault(name, hashlib.sha256()).update(np.ascontiguousarray(values).data)
         moving = turning(block) if "rate" in block.columns else np.zeros(len(block), dtype=bool)
         kept = evaluation.full & evaluation.settled
+        self.unsettled += int(np.count_nonzero(~kept))
         if moving.any():
             kept &= ~transition_mask(block)
         warmth = leading_temperature(block)
@@ -247,6 +252,21 @@ class _Recording:
         self.spoilt += spoiling(block)
         self.outside += int(np.count_nonzero(evaluation.outside & evaluation.full))
         self.last_s = float(block.time[-1])
+
+    def used(self, mean: Mapping[str, FloatArray], name: str, averaging_s: float) -> tuple[BoolArray, bool]:
+        """Averages that tell what is left, at rest where there are enough; and whether inside training."""
+        rest = mean["moving"] == 0.0
+        used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(rest), dtype=bool)
+        inside = used & (mean["outside"] < 0.5)
+        # Outside the model states little that could change; a run of nothing else tells as little.
+        used = inside if (is_inside := bool(inside.sum() >= LEAST_WINDOWS)) else used
+        if used.sum() < LEAST_WINDOWS:
+            raise InputError(
+                f"{name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows "
+                f"are full; {LEAST_WINDOWS} are needed to tell what the model leaves, "
+                + (_SETTLING if 2 * self.unsettled > self.samples else "record longer or set --averaging")
+            )
+        return used, is_inside
 
     def hold_usable(self, is_inside: bool, most_spoilt: float) -> None:
         """Refuse a recording whose output is not the gyro's, or not what it is stated to be.
@@ -272,25 +292,6 @@ class _Recording:
         for name in sorted(self.columns):
             digest.update(f"{name}\0{self.columns[name].hexdigest()}".encode())
         return digest.hexdigest()
-
-
-def _used(mean: Mapping[str, FloatArray], name: str, averaging_s: float) -> tuple[BoolArray, bool]:
-    """Averages that tell what is left, shape (m,), and whether they are inside training.
-
-    Those at rest where there are enough. Outside training the model states little that could change; a run
-    of nothing else tells as little.
-    """
-    rest = mean["moving"] == 0.0
-    used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(rest), dtype=bool)
-    inside = used & (mean["outside"] < 0.5)
-    is_inside = bool(inside.sum() >= LEAST_WINDOWS)
-    used = inside if is_inside else used
-    if used.sum() < LEAST_WINDOWS:
-        raise InputError(
-            f"{name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows are full; "
-            f"{LEAST_WINDOWS} are needed to tell what the model leaves, record longer or set --averaging"
-        )
-    return used, is_inside
 
 
 class _Means:

@@ -138,6 +138,17 @@ def test_a_run_that_is_too_short_is_refused(model, tmp_path):
         record_run(model, [])
 
 
+def test_what_a_model_s_memory_hides_of_a_run_is_told_as_that(tmp_path):
+    """No averaging time mends it: the room's temperature never moves a wide play from end to end."""
+    run = read_run(write_run(tmp_path, 9))
+    warmth = run.temperature("T")
+    half = 0.4 * np.ptp(warmth)
+    remembers = make_model("polynomial", f"T, play(T, {half:g} degC)", 0, {}).fit([run])
+    mild = run.with_columns(T=warmth.mean() + 0.5 * (warmth - warmth.mean()))
+    with pytest.raises(InputError, match=r"most samples come before .*twice its half width"):
+        record_run(remembers, [mild])
+
+
 def test_an_output_that_is_not_the_gyro_s_is_not_kept(model, tmp_path):
     run = read_run(write_run(tmp_path, 13))
     gyro, half = run.gyro, len(run) // 2
