@@ -23,6 +23,7 @@ from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect
 from fogml.twin.twin import EffectSetting
+from fogml.twin.uncertainty import root_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +130,8 @@ class Foretold:
     def drawn(self, rng: np.random.Generator) -> FloatArray:
         """The mean of the coefficients, then draws from their posterior, shape (q, 1 + draws)."""
         draws = self.found.setting.priors.reported.draws
-        values, vectors = np.linalg.eigh(self.posterior.covariance)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        off = np.concatenate([np.zeros((len(values), 1)), rng.standard_normal((len(values), draws))], axis=1)
+        root = root_of(self.posterior.covariance)
+        off = np.concatenate([np.zeros((len(root), 1)), rng.standard_normal((len(root), draws))], axis=1)
         return np.asarray(self.posterior.mean[:, None] + root @ off)
 
 

@@ -11,6 +11,14 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 
 
+def root_of(covariance: FloatArray) -> FloatArray:
+    """A matrix R with R R' the covariance, (k, k), of parameters whose units may differ by any factor."""
+    # In units of deviations: in the parameters' own, rounding of the large ones outdoes the small.
+    scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Covariance of a twin's parameters about the values that it states.
@@ -48,10 +56,7 @@ class Uncertainty:
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """How far each parameter is from its value, in one draw."""
-        # In units of deviations: in a file's own, rounding of the large ones outdoes the small.
-        scale = np.sqrt(np.maximum(np.diag(self.covariance), np.finfo(np.float64).tiny))
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
-        off = scale * (vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(values))))
+        off = root_of(self.covariance) @ rng.standard_normal(len(self.names))
         return dict(zip(self.names, off.tolist()))
 
     def without(self, *starts: str) -> Uncertainty:

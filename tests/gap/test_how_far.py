@@ -1,12 +1,15 @@
 """When a held-out run's white noise is its own."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import fogml.gap.how_far as how_far
+from fogml.gap.how_far import Foretold
+from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.noise import white_noise
 from fogml.gap.settings import Priors
 from fogml.signals.noise_model import NoiseModel
@@ -17,6 +20,18 @@ ROWS, STATED = 60, 1.4
 def _rows(seed):
     gap = np.random.default_rng(seed).standard_normal(ROWS)
     return SimpleNamespace(gap=gap, constants=np.ones((ROWS, 1)), row_s=3600.0)
+
+
+def test_draws_of_small_coefficients_beside_large_ones_have_their_own_scatter():
+    """Whatever their units: here deviations from 1e-11 to 1e6, each correlated by 0.5 with each other."""
+    deviations = np.array([1e6, 1.0, 1e-4, 1e-11])
+    covariance = np.outer(deviations, deviations) * (0.5 + 0.5 * np.eye(4))
+    priors = replace(Priors(), reported=replace(Priors().reported, draws=20_000))
+    found = SimpleNamespace(setting=SimpleNamespace(priors=priors))
+    told = Foretold(found, (), Posterior(np.zeros(4), covariance)).drawn(np.random.default_rng(0))
+    np.testing.assert_array_equal(told[:, 0], 0.0)
+    off = told[:, 1:] / deviations[:, None]
+    np.testing.assert_allclose(off @ off.T / off.shape[1], 0.5 + 0.5 * np.eye(4), atol=0.03)
 
 
 def test_white_noise_of_a_run_is_known_as_well_as_stated():
