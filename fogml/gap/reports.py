@@ -90,7 +90,9 @@ def noise_of(found: Inference, after: Foretold) -> NoiseReport:
     count = sum(map(len, parts))
     if count < priors.reported.fewest_checked:
         return told
-    step = scene.runs[scene.fitted].row_s
+    # Lags are counted in rows, whose length is a run's own.
+    rows_s = [scene.runs[i].row_s for i in range(scene.fitted, len(scene.runs))]
+    step = float(np.average(rows_s, weights=[len(part) for part in parts]))
     check = whiteness(parts, sample_s=step)
     return replace(
         told,

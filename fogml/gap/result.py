@@ -169,7 +169,8 @@ class NoiseReport:
     """The noise model.
 
     ``coefficients`` and ``relative_se`` by the names N, B, K. ``source`` says what it was fitted
-    on; ``white`` and ``failed`` are the check on the held-out runs' innovations.
+    on; ``white`` and ``failed`` are the check on the held-out runs' innovations. ``lags_s`` and ``scales_s``
+    count rows, each of the mean length of the held-out runs' [s].
     """
 
     coefficients: Mapping[str, float]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fogml.gap.how_far as how_far
+import fogml.gap.reports as reports
 from fogml.gap.how_far import Foretold
 from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.noise import white_noise
@@ -58,3 +59,23 @@ def test_beyond_three_of_its_errors_the_noise_is_the_runs_own(monkeypatch, error
     model, said = how_far._own_noise(found, 1, ())
     assert (white if own else usual.N) == model.N and model.B == usual.B
     assert bool(said) == (own and abs(math.log(white / shown["fit"])) > bound)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_lags_of_held_out_runs_of_other_rows_are_in_the_mean_length_of_all(monkeypatch, order):
+    """Whichever run comes first: 300 rows of 10 s and 100 of 30 s are of 15 s in the mean."""
+    rng = np.random.default_rng(0)
+    runs = [
+        SimpleNamespace(gap=rng.standard_normal(count), row_s=row_s)
+        for count, row_s in ((300, 10.0), (100, 30.0))
+    ]
+    usual = NoiseModel(0.01, 0.001, 0.0)
+    found = SimpleNamespace(
+        field=SimpleNamespace(whitening=SimpleNamespace(noise=usual)),
+        points=SimpleNamespace(fit=SimpleNamespace(standard_errors=np.zeros(3)), source="runs"),
+        scene=SimpleNamespace(runs=[None, *(runs[i] for i in order)], fitted=1),
+        setting=SimpleNamespace(priors=Priors()),
+    )
+    monkeypatch.setattr(reports, "whitener_of", lambda *_: SimpleNamespace(whiten=lambda values: values))
+    told = reports.noise_of(found, SimpleNamespace(on=lambda run: 0.0))
+    assert told.lags_s[:3] == pytest.approx((15.0, 30.0, 60.0)) and told.samples == 400
