@@ -29,7 +29,9 @@ class Exchange(Pictured):
 
     @classmethod
     def from_pandas(cls, frame: pd.DataFrame, name: str = "run", facts: Facts | None = None) -> Self:
-        """A run from a frame, a column each; what becomes of the frame later does not change it.
+        """A run from a frame, a column each, looked at as a file's is (``findings``).
+
+        What becomes of the frame later does not change it.
 
         Parameters
         ----------
@@ -49,6 +51,8 @@ class Exchange(Pictured):
             If a column is named twice, or in a unit that the run format does not take, its values are no
             numbers, or there are no times.
         """
+        from fogml.runs.checks import check_run  # which takes runs
+
         cells = canonical_cells([str(cell) for cell in frame.columns])
         held = [(*parse_header(cell), frame.iloc[:, place]) for place, cell in enumerate(cells)]
         if "time" not in [column for column, _, _ in held]:
@@ -68,7 +72,9 @@ class Exchange(Pictured):
                 facts = facts.model_copy(update={"started": series[:1].to_list()[0].to_pydatetime()})
             columns[column] = values
         is_count = ("gyro", "count") in [(column, unit) for column, unit, _ in held]
-        return cls(name, columns, facts, "count" if is_count else "deg/h")  # type: ignore[call-arg]
+        run: Any = cls(name, columns, facts, "count" if is_count else "deg/h")  # type: ignore[call-arg]
+        noticed: Self = run.with_findings(check_run(run))
+        return noticed
 
     def to_pandas(self) -> pd.DataFrame:
         """The columns as a frame, in internal units that the names state: ``gyro [deg/h]``."""

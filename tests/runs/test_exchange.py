@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
+from fogml.runs.reading import read_run
 from fogml.runs.run import Run
 from fogml.signals.allan import allan_deviation
 
@@ -72,6 +74,16 @@ def test_an_index_that_may_count_rows_is_no_clock() -> None:
     for frame in (whole, whole[whole.gyro != 3.0], whole.set_index("T")):
         with pytest.raises(InputError, match="call the index 'time \\[s\\]'"):
             Run.from_pandas(frame)
+
+
+def test_a_frame_is_looked_at_as_a_file_is(tmp_path: Path) -> None:
+    warm = 293.15 + 10.0 * np.sin(TIME / 100.0)
+    frame = pd.DataFrame({"time [s]": TIME, "gyro [deg/h]": np.sin(TIME), "T [degC]": np.round(warm, 2)})
+    frame.loc[50:, "time [s]"] += 100.0
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    read, made = read_run(tmp_path / "a.csv"), Run.from_pandas(frame, "a.csv")
+    assert {"gap", "implausible_temperature"} <= {finding.code for finding in made.findings}
+    assert made.findings == read.findings and made.hash == read.hash
 
 
 def test_a_frame_is_called_as_a_file_is() -> None:
