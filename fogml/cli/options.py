@@ -58,10 +58,6 @@ def names_list(value: object) -> object:
     return value
 
 
-def _by_name(value: object) -> object:
-    return named_values(value) if isinstance(value, list) else value
-
-
 Repairing = bool | Literal["anyway"]
 """Whether faulty rows are repaired, and ``anyway`` if however many that drops."""
 Repair = Annotated[
@@ -96,7 +92,9 @@ LOST_MODEL = "no such folder; name the one that 'fogml train' wrote the model in
 Model = Annotated[str, option("Name of the model.", metavar="NAME", known="fogml.models.names:MODEL_NAMES")]
 Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".', metavar="FEATURES")]
 Parameters = Annotated[
-    dict[str, Any], option("Parameter of the model; may be repeated.", "--set"), BeforeValidator(_by_name)
+    dict[str, Any],
+    option("Parameter of the model; may be repeated.", "--set"),
+    BeforeValidator(lambda value: named_values(value) if isinstance(value, list) else value),
 ]
 Averaging = Annotated[float, Field(gt=0.0), option("Averaging time of the figures.", metavar="SECONDS")]
 Strict = Annotated[

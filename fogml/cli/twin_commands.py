@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, field_validator
 
 from fogml.cli import options
 from fogml.cli.given import load, option
@@ -114,10 +114,6 @@ def _groups(value: Any) -> Any:
     return [options.names_list(group) for group in value] if isinstance(value, list) else value
 
 
-def _capital(value: Any) -> Any:
-    return value.upper() if isinstance(value, str) else value
-
-
 def _usual_latitude() -> float:
     from fogml.twin.simulate import DEFAULT_FACTS
 
@@ -145,7 +141,7 @@ class PlanSettings(Settings):
         known=options.EFFECTS,
     )
     hours: float = setting(24.0, "Longest time of a run.", metavar="HOURS")
-    criterion: Annotated[str, BeforeValidator(_capital)] = setting(
+    criterion: Annotated[str, StringConstraints(to_upper=True)] = setting(
         "D",
         "D: volume of the confidence ellipsoid; A: mean square of the standard errors.",
         metavar="D|A",

@@ -202,7 +202,7 @@ def _write_numbers(
     from fogml.export import number_files
     from fogml.export.onnx_graph import BEYOND
 
-    inputs = _own_atoms(plan, settings.seed, rows)
+    inputs = box_points(plan, settings.seed) if rows is None else rows.atoms_of(plan)
     columns = plan.full_columns(inputs)
     stored, exported = stored_plan(plan, dtype, columns)
     seed = settings.seed
@@ -217,12 +217,6 @@ def _write_numbers(
         read = [number_files.read_mat(folder, plan)]
     differences = [value_difference(plan, lambda c, g, p=p: p.value(c, g), seed) for p in read]  # type: ignore[misc]
     return {"difference": max(differences, key=lambda difference: difference.inside)}, exported
-
-
-def _own_atoms(plan: Plan, seed: int, rows: TrainingRows | None) -> FloatArray:
-    if rows is None:
-        return box_points(plan, seed)
-    return rows.atoms_of(plan)
 
 
 def _write_onnx(

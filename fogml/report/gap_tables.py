@@ -59,7 +59,7 @@ def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
             f.place or MISSING,
             shape or MISSING,
             "; ".join(others) or "nothing: alone in its class",
-            _consistency(f),
+            _agreement(f) + ("" if f.onset is None else f"; from {f.onset.run}, {f.onset.time_s:.0f} s, on"),
         )
         rows.append(Row(cells, "chosen" if f.named and not is_suspected else ""))
     if not rows:
@@ -74,12 +74,8 @@ def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     )
 
 
-def _consistency(found: Found) -> str:
-    since = "" if found.onset is None else f"; from {found.onset.run}, {found.onset.time_s:.0f} s, on"
-    return _agreement(found) + since
-
-
 def _agreement(found: Found) -> str:
+    """How an effect's sizes on the runs go together."""
     count = len(found.by_run)
     if found.grows is not None:
         way = "grows" if found.grows * found.amplitude.value > 0.0 else "fades"

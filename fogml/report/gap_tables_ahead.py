@@ -13,6 +13,7 @@ from fogml.report.tables import Table, columns_of
 
 MOST_ROWS = 20
 _SIZES = {"usual": "usual", "found": "as found"}
+_WORST = ("mistaken", "missed", "named")
 _FORMS = {"usual": "middle of the ranges", "low": "low ends", "high": "high ends"}
 
 
@@ -94,7 +95,7 @@ def rehearsal_table(rehearsal: Sequence[Rehearsed], names: dict[str, str]) -> Ta
         return None
     return Table(
         "If this acted | Shape | Size | >Shows [noise lengths] | It would be | >Probability",
-        (_rehearsed(r, names) for r in _worst_first(rehearsal)),
+        (_rehearsed(r, names) for r in sorted(rehearsal, key=lambda r: (_WORST.index(r.outcome), -r.length))),
         caption="Each candidate is put into replays of these runs, without noise, and judged by the "
         "evidence of one cause. Under a length of 3 nothing can be told.",
     )
@@ -111,11 +112,6 @@ def _rehearsed(r: Rehearsed, names: dict[str, str]) -> tuple[str, ...]:
         outcome[r.outcome],
         probability_words(r.probability),
     )
-
-
-def _worst_first(rows: Sequence[Rehearsed]) -> list[Rehearsed]:
-    order = {"mistaken": 0, "missed": 1, "named": 2}
-    return sorted(rows, key=lambda r: (order[r.outcome], -r.length))
 
 
 def compensation_table(found: Diagnosis, names: dict[str, str]) -> Table | None:

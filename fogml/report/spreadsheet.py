@@ -223,7 +223,7 @@ def _figures(writer: Writer, judgement: Judgement) -> None:
 def _findings(writer: Writer, judgement: Judgement) -> None:
     rows = []
     for run in (*judgement.train, *judgement.test):
-        rows += [(run.run, told.code, told.message, told.place) for told in noticed(run.findings)]
+        rows += [(run.run, *told) for told in noticed(run.findings)]
         rows += [(run.run, "note", note, "") for note in run.notes]
     rows += [("", "note", str(note), "") for note in (*judgement.notes, *judgement.model.get("notes", ()))]
     writer.table_sheet("Findings and notes", ("run", "code", "message", "place"), rows, (22, 22, 100, 28))

@@ -88,15 +88,6 @@ def columns_of(headings: str) -> tuple[Column, ...]:
     return tuple(columns)
 
 
-@dataclass(frozen=True)
-class Noticed:
-    """A finding with its place in words."""
-
-    code: str
-    message: str
-    place: str
-
-
 def reference_of(judged: RunJudgement) -> str:
     """What biases are relative to, in words."""
     return "known Earth rate" if judged.bias_reference == "earth rate" else "the training runs' mean"
@@ -238,8 +229,8 @@ def candidates_table(model: Mapping[str, Any]) -> Table | None:
     )
 
 
-def noticed(findings: Iterable[Finding | Mapping[str, Any]]) -> list[Noticed]:
-    """Findings with their places in words, from objects or from their JSON form."""
+def noticed(findings: Iterable[Finding | Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """Codes, messages and places in words of findings, from objects or from their JSON form."""
     shown = []
     for finding in findings:
         values = finding.as_dict() if isinstance(finding, Finding) else finding
@@ -247,5 +238,5 @@ def noticed(findings: Iterable[Finding | Mapping[str, Any]]) -> list[Noticed]:
         place += [f"from row {values['row']}"] if values.get("row") else []
         message = str(values["message"])
         message = f"{values['run']}: {message}" if values.get("run") else message
-        shown.append(Noticed(str(values["code"]), message[:1].upper() + message[1:], ", ".join(place)))
+        shown.append((str(values["code"]), message[:1].upper() + message[1:], ", ".join(place)))
     return shown

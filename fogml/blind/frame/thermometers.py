@@ -134,7 +134,7 @@ def sense(rng: np.random.Generator, world: World, instruments: Instruments) -> S
     return Sensed(felt_by(instruments, world), noise, instruments)
 
 
-def recorded_run(
+def drawn_run(
     rng: np.random.Generator, name: str, world: World, instruments: Instruments, noise: StateNoise
 ) -> UnitRun:
     """A run of what happened, with the noise of its thermometers and of the gyro."""

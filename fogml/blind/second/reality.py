@@ -16,7 +16,7 @@ from fogml.arrays import FloatArray
 from fogml.blind.frame.form import Form, draw_demands, draw_set_up, forms_in
 from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.record import Course, SetUp, World
-from fogml.blind.frame.thermometers import draw_instruments, quick_enough, recorded_run
+from fogml.blind.frame.thermometers import draw_instruments, drawn_run, quick_enough
 from fogml.blind.frame.unit import Reality, Unit, UnitRun
 from fogml.blind.second.effects import driven, lasting, turning, unknown, winding
 from fogml.blind.second.plant import NAMES, Plant, draw_plant
@@ -194,7 +194,7 @@ def draw_unit(
 
     def run(name: str, programme: Programme, of: StateNoise, place: int) -> UnitRun:
         world = happen(rng, plant, chamber, programme, set_up, sample_s, place, begin, past)
-        return recorded_run(rng, name, world, instruments, of)
+        return drawn_run(rng, name, world, instruments, of)
 
     names = [*(f"fit-{k + 1}.csv" for k in range(runs)), "held-out-1.csv"]
     thermal = []

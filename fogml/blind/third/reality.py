@@ -14,7 +14,7 @@ from fogml.blind.frame.form import Demands, Form, forms_in
 from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.operators import late
 from fogml.blind.frame.record import Course, SetUp, World
-from fogml.blind.frame.thermometers import draw_instruments, quick_enough, recorded_run
+from fogml.blind.frame.thermometers import draw_instruments, drawn_run, quick_enough
 from fogml.blind.frame.unit import Reality, Unit, UnitRun
 from fogml.blind.third.effects import driven, winding
 from fogml.blind.third.plant import NAMES, Plant, draw_plant
@@ -241,7 +241,7 @@ def draw_unit(
 
     def run(name: str, programme: Programme, of: StateNoise, place: int) -> UnitRun:
         world = happen(rng, plant, programme, set_up, sample_s, place, begin, past)
-        return recorded_run(rng, name, world, instruments, of)
+        return drawn_run(rng, name, world, instruments, of)
 
     thermal = []
     for place in range(runs + 1):
