@@ -16,10 +16,12 @@ from fogml.gap.step_settings import NoiseSettings, Reported, RowSettings, Search
 from fogml.models.size_priors import SizePriors
 from fogml.monitor.evidence import ChangePrior
 from fogml.runs.thermometers import LimitSettings
+from fogml.signals.noise_spectrum import Resolution
+from fogml.twin.plant.fit import FitSettings
 
 KINDS = (
     *(Priors, RowSettings, NoiseSettings, SearchSettings, Reported, Grids, RepeatSettings),
-    *(SizePriors, ChangePrior, LimitSettings),
+    *(SizePriors, ChangePrior, LimitSettings, Resolution, FitSettings),
 )
 
 

@@ -10,7 +10,7 @@ import yaml
 
 from fogml.errors import InputError
 from fogml.twin.draws import drawn_twin, parameter_values
-from fogml.twin.plant.fit import fit_plant
+from fogml.twin.plant.fit import _with, fit_plant
 from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.plant.standard import ThermalConstants
 from fogml.twin.set_up import Plant
@@ -161,6 +161,22 @@ def test_a_plant_is_fitted_beside_all_else_that_changes_it(effect, actions):
         fitted, known = (getattr(plant.constants, name) for plant in (found.plant, true.plant))
         assert fitted == pytest.approx(known, rel=0.02), name
     assert max(found.misfit_degc.values()) < 0.01
+
+
+def test_power_that_is_drawn_or_tried_is_one_that_a_unit_can_have():
+    """Up to the most that a twin file may state, the power right after switching on too."""
+    hot = replace(load_twin("nominal"), plant=Plant(heating=SelfHeating(900.0, 950.0)))
+    unsure = replace(hot, uncertainty=Uncertainty(("plant.heating.steady",), np.array([[400.0**2]])))
+    drawn = [drawn_twin(unsure, 0, number).plant.heating for number in range(40)]
+    assert max(one.steady_w for one in drawn) == max(one.initial_w for one in drawn) == 1000.0
+    assert min(one.steady_w for one in drawn) < 700.0
+    tried = _with(hot, {"steady": 5000.0, "time_constant": 1e-3, "case": 1e9}).plant
+    assert (tried.heating.steady_w, tried.heating.initial_w, tried.heating.time_constant_s) == (
+        1000.0,
+        1000.0,
+        1.0,
+    )
+    assert tried.constants.case == 1e6
 
 
 def test_without_air_or_another_node_no_plant_is_fitted():

@@ -14,29 +14,55 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.runs.run import Run
-from fogml.twin.plant.heat import PowerWindows
+from fogml.settings_check import check_numbers
+from fogml.twin.plant.heat import HEATING, PowerWindows
 from fogml.twin.plant.network import AIR
 from fogml.twin.plant.standard import QUANTITIES
 from fogml.twin.replay import inputs_of_run
 from fogml.twin.set_up import Plant
 from fogml.twin.twin import Twin
 
-FACTOR = 2.0
-"""One standard deviation of a constant's prior, as a factor: their ranges are about two of them wide."""
-SETTLING_S = 3600.0
-"""A run may begin far from rest: so much of it is not fitted to, or a quarter where that is less [s]."""
-MOST_ROWS = 600
-"""Rows of a run: a minute in ten hours, well under any constant."""
-FEWEST_ROWS = 32
-LEAST_MOTION_DEGC = 2.0
-"""A run that moves less tells nothing of a plant."""
-MISFIT_DEGC = 0.02
-"""What a network of a few nodes may miss of a sensor, at least [degC]."""
-TOLD = 0.5
-"""A constant counts as told where its logarithm's standard error is below this share of its prior's."""
 READ = ("T_case", "T_out", "T_in", "T_electronics")
 _TIMES = tuple(q.name for q in QUANTITIES if q.unit == "s" and q.name != "plate")
 _HEATING = ("steady", "time_constant")
+_QUANTITY = {q.name: q for q in (*QUANTITIES, *HEATING)}
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """How a plant is fitted.
+
+    Attributes
+    ----------
+    factor
+        One standard deviation of a constant's prior, as a factor: their ranges are about two of them wide.
+    settling_s
+        A run may begin far from rest: so much of it is not fitted to, or a quarter where that is less [s].
+    most_rows, fewest_rows
+        Rows of a run: at most one a minute in ten hours, well under any constant.
+    least_motion_degc
+        A run that moves less tells nothing of a plant [degC].
+    misfit_degc
+        What a network of a few nodes may miss of a sensor, at least [degC].
+    told
+        A constant counts as told where its logarithm's standard error is below this share of its prior's.
+    """
+
+    factor: float = 2.0
+    settling_s: float = 3600.0
+    most_rows: int = 600
+    fewest_rows: int = 32
+    least_motion_degc: float = 2.0
+    misfit_degc: float = 0.02
+    told: float = 0.5
+
+    def __post_init__(self) -> None:
+        may_be_0 = ("settling_s", "least_motion_degc")
+        check_numbers(self, above_1=("factor",), shares=("told",), may_be_0=may_be_0)
+
+
+STANDARD = FitSettings()
+"""How a plant is fitted unless told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +100,7 @@ class _Course:
     counted: BoolArray
 
 
-def fit_plant(twin: Twin, runs: Sequence[Run]) -> PlantFit | None:
+def fit_plant(twin: Twin, runs: Sequence[Run], settings: FitSettings = STANDARD) -> PlantFit | None:
     """A plant's constants from what runs of one unit recorded; None where they tell none.
 
     Parameters
@@ -84,6 +110,8 @@ def fit_plant(twin: Twin, runs: Sequence[Run]) -> PlantFit | None:
         are, since temperatures alone tell ratios.
     runs
         With chamber air and another temperature recorded, the same ones.
+    settings
+        How closely.
     """
     from scipy.optimize import least_squares
 
@@ -93,15 +121,15 @@ def fit_plant(twin: Twin, runs: Sequence[Run]) -> PlantFit | None:
     chamber = all(AIR in run.columns for run in runs)
     if not names or not chamber or plant.line is not None or plant.ends is not None:
         return None
-    courses = [c for run in runs if (c := _course(run, names)) is not None]
+    courses = [c for run in runs if (c := _course(run, names, settings)) is not None]
     if not courses:
         return None
     start = _values(plant)
-    sd = np.log(FACTOR)
+    sd = np.log(settings.factor)
 
     def residuals(logs: FloatArray, free: Sequence[str]) -> FloatArray:
         moved = _with(twin, {n: start[n] * float(np.exp(x)) for n, x in zip(free, logs)})
-        parts = [_left(moved, course) / MISFIT_DEGC for course in courses]
+        parts = [_left(moved, course) / settings.misfit_degc for course in courses]
         return np.concatenate([*parts, logs / sd])
 
     free = _moving(residuals, tuple(start))
@@ -112,7 +140,7 @@ def fit_plant(twin: Twin, runs: Sequence[Run]) -> PlantFit | None:
     # Residuals of a network that is not quite right go on for hours: as many as they are long count for one.
     inflated = max(float(np.mean(left**2)), 1.0) * _correlated(left)
     covariance = np.linalg.inv(found.jac.T @ found.jac / inflated + np.eye(len(free)) / sd**2)
-    told = [i for i in range(len(free)) if covariance[i, i] ** 0.5 < TOLD * sd]
+    told = [i for i in range(len(free)) if covariance[i, i] ** 0.5 < settings.told * sd]
     if not told:
         return None
     fitted = _with(twin, {free[i]: start[free[i]] * float(np.exp(found.x[i])) for i in told})
@@ -133,19 +161,21 @@ def _recorded(run: Run) -> dict[str, FloatArray]:
     return told
 
 
-def _course(run: Run, names: Sequence[str]) -> _Course | None:
+def _course(run: Run, names: Sequence[str], settings: FitSettings) -> _Course | None:
     run = run.without_dropouts
     inputs, powered = inputs_of_run(run)
-    step = max(1, len(run) // MOST_ROWS)
+    step = max(1, len(run) // settings.most_rows)
     told = _recorded(run) | {AIR: run.columns[AIR]}
     rows = {name: told[name][::step] for name in (*names, AIR)} | {"turning": inputs.turning_deg_s[::step]}
     rows |= {"fan": inputs.drives["fan"][::step]} if "fan" in inputs.drives else {}
     usable = np.all([np.isfinite(values) for values in rows.values()], axis=0)
     time, read = run.time[::step][usable], {name: values[usable] for name, values in rows.items()}
     turning, fan = read.pop("turning"), read.pop("fan", None)
-    if len(time) < FEWEST_ROWS or max(float(np.ptp(v)) for v in read.values()) < LEAST_MOTION_DEGC:
+    if len(time) < settings.fewest_rows:
         return None
-    skipped = min(SETTLING_S, 0.25 * float(time[-1] - time[0]))
+    if max(float(np.ptp(values)) for values in read.values()) < settings.least_motion_degc:
+        return None
+    skipped = min(settings.settling_s, 0.25 * float(time[-1] - time[0]))
     return _Course(powered, time, read.pop(AIR), fan, turning, read, time - time[0] >= skipped)
 
 
@@ -198,13 +228,13 @@ def _key(name: str) -> str:
 def _with(twin: Twin, values: Mapping[str, float]) -> Twin:
     """A twin with its plant's constants changed; the power after switching on goes with the steady one."""
     plant = twin.plant
-    limits = {q.name: q.limits for q in QUANTITIES}
-    times = {n: float(np.clip(v, *limits[n])) for n, v in values.items() if n not in _HEATING}
+    values = {name: _QUANTITY[name].within(value) for name, value in values.items()}
+    times = {name: value for name, value in values.items() if name not in _HEATING}
     heating = plant.heating
     if "steady" in values and heating.steady_w > 0.0:
-        factor = values["steady"] / heating.steady_w
-        heating = replace(heating, steady_w=values["steady"], initial_w=heating.initial_w * factor)
+        initial = _QUANTITY["initial"].within(heating.initial_w * values["steady"] / heating.steady_w)
+        heating = replace(heating, steady_w=values["steady"], initial_w=initial)
     if "time_constant" in values:
-        heating = replace(heating, time_constant_s=max(values["time_constant"], 1.0))
+        heating = replace(heating, time_constant_s=values["time_constant"])
     changed = replace(plant, constants=replace(plant.constants, **times), heating=heating)
     return replace(twin, plant=changed)
