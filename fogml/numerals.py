@@ -30,17 +30,12 @@ def short(value: float | None, digits: int = 3) -> str:
 
 
 _LABELS = {
-    "bias": "Bias",
-    "bias_stability": "Bias stability",
     "bias_stability_10s": "Bias stability, 10 s averages",
-    "range": "Range",
-    "rms": "Rms",
     "scale_factor_error": "Scale-factor error",
     "scale_factor_error_largest": "Scale-factor error, largest of single turns",
     "scale_factor_nonlinearity": "Scale-factor nonlinearity",
     "scale_factor_asymmetry": "Scale-factor asymmetry",
     "scale_factor_repeatability": "Scale-factor repeatability",
-    "bias_repeatability": "Bias repeatability",
     "turn_on_time": "Turn-on time",
     "temperature_sensitivity": "Bias temperature sensitivity",
     "hysteresis": "Thermal hysteresis",
@@ -61,7 +56,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def label(quantity: str) -> str:
-    """The name of a quantity of `Metrics` in words; an unknown one with spaces for underscores."""
+    """The name of a quantity of `Metrics` in words: its own, else that of its key."""
     return _LABELS.get(quantity, quantity.replace("_", " ").capitalize())
 
 

@@ -15,9 +15,7 @@ from fogml.report.style import log_axis, regime_word
 _STAGE_WORDS = {
     "rig": "rig: table, chamber, mount",
     "sensor": "temperature sensor",
-    "logger": "logger",
     "thermal": "thermal plant",
-    "scale_factor": "scale factor",
     "loop": "loop electronics",
 }
 Spread = tuple[float, float]

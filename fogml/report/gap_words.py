@@ -18,19 +18,12 @@ from fogml.numerals import (
 )
 from fogml.twin.registry import effects
 
-_HEADLINES = {
-    "no_gap": "No gap",
-    "explained": "Explained",
-    "ambiguous": "Ambiguous",
-    "partly_explained": "Partly explained",
-    "unknown": "Unknown",
-}
 _LIKELY_MEMBERS = 4
 
 
 def verdict_words(found: Diagnosis) -> str:
     """The verdict as a word or two."""
-    return _HEADLINES[found.verdict]
+    return found.verdict.replace("_", " ").capitalize()
 
 
 def titles(found: Diagnosis) -> dict[str, str]:
