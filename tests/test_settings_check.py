@@ -13,6 +13,7 @@ from fogml.gap.grids import Grids
 from fogml.gap.planning.next_run import RepeatSettings
 from fogml.gap.settings import Priors
 from fogml.gap.step_settings import NoiseSettings, Reported, RowSettings, SearchSettings
+from fogml.lab.rate_tests import Criteria
 from fogml.models.size_priors import SizePriors
 from fogml.monitor.evidence import ChangePrior
 from fogml.runs.thermometers import LimitSettings
@@ -21,7 +22,7 @@ from fogml.twin.plant.fit import FitSettings
 
 KINDS = (
     *(Priors, RowSettings, NoiseSettings, SearchSettings, Reported, Grids, RepeatSettings),
-    *(SizePriors, ChangePrior, LimitSettings, Resolution, FitSettings),
+    *(SizePriors, ChangePrior, LimitSettings, Resolution, FitSettings, Criteria),
 )
 
 

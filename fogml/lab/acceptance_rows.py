@@ -128,6 +128,10 @@ class Limit:
     low: float
     high: float
 
+    def __post_init__(self) -> None:
+        if not self.low <= self.high:
+            raise InputError(f"a limit from {self.low:g} to {self.high:g}: the first is the lower one")
+
     def holds(self, value: float) -> bool:
         """Whether a value is allowed."""
         return self.low <= value <= self.high
@@ -153,6 +157,11 @@ class Limits:
     document: str | None = None
     file: str | None = None
     sha256: str | None = None
+
+    def __post_init__(self) -> None:
+        for key in self.by_quantity:
+            if key not in BY_KEY:
+                raise InputError(f"no quantity {quoted(key)}; {known_are(str(key), BY_KEY)}")
 
 
 def read_limits(path: str | Path) -> Limits:

@@ -15,6 +15,7 @@ import numpy as np
 from fogml.arrays import FloatArray, IndexArray
 from fogml.lab.rate_errors import Spread, spread_of
 from fogml.lab.rate_pieces import ROUND_OFF_DEG_H, Plateaus, merged
+from fogml.settings_check import check_numbers
 from fogml.validation.scale_factor import LEAST_LEVELS, nonlinearity_ppm
 
 LEAST_FOR_DRIFT = 3
@@ -48,6 +49,10 @@ class Criteria:
     small: float = 0.02
     doubt: float = 0.2
     errors: float = 2.0
+
+    def __post_init__(self) -> None:
+        chances, shares = ("answers", "dead", "range_error"), ("small", "doubt")
+        check_numbers(self, chances=chances, shares=shares, may_be_0=("errors",))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from click.testing import CliRunner
 from fogml.cli.main import app
 from fogml.errors import InputError
 from fogml.lab.acceptance import acceptance_json
-from fogml.lab.acceptance_rows import QUANTITIES, read_limits
+from fogml.lab.acceptance_rows import QUANTITIES, Limit, Limits, read_limits
 from fogml.models.names import make_model
 from fogml.pictures import Curve
 from fogml.report import acceptance_page as page
@@ -199,3 +200,11 @@ def test_soaks_of_two_runs_are_no_one_line(monkeypatch: pytest.MonkeyPatch) -> N
     page._figure({"soaks": soaks, "model": None})
     assert [curve.y.tolist() for curve in drawn] == [[-40.0, 60.0], [-35.0, 65.0]]
     assert [curve.label for curve in drawn] == ["way up", ""]
+
+
+def test_limits_that_python_sets_are_checked_as_those_of_a_file():
+    with pytest.raises(InputError, match="no quantity 'bias_stabilty'; did you mean 'bias_stability'"):
+        Limits({"bias_stabilty": Limit(-1.0, 1.0)})
+    for low, high in ((1.0, -1.0), (math.nan, 1.0)):
+        with pytest.raises(InputError, match="the first is the lower one"):
+            Limit(low, high)
