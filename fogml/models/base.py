@@ -80,11 +80,7 @@ class Compensation:
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """The columns that ``fogml compensate`` writes, by their header cells."""
-        return {
-            "drift [deg/h]": self.drift,
-            "gyro_compensated [deg/h]": self.compensated,
-            "flag": self.flag,
-        }
+        return {"drift [deg/h]": self.drift, "gyro_compensated [deg/h]": self.compensated, "flag": self.flag}
 
 
 def compensation_of(run: Run, evaluation: Evaluation) -> Compensation:
@@ -259,8 +255,9 @@ class DriftModel(BaseEstimator, ABC):
         half = self.intervals_.half_width(level, evaluation.excess)
         return evaluation.drift - half, evaluation.drift + half
 
-    def compensate(self, run: Run) -> Compensation:
-        """Subtract the drift; flag what is outside the trained box or has no full window."""
+    def compensate(self, run: Run, any_unit: bool = False) -> Compensation:
+        """Subtract the drift where `check_applies`; flag what is outside the trained box or not settled."""
+        self.check_applies(run, any_unit)
         return compensation_of(run, self.evaluate(run))
 
     def score(self, runs: Run | Sequence[Run], averaging_s: float = 100.0) -> float:

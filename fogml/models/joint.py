@@ -158,28 +158,23 @@ class JointModel(DriftModel):
         return self
 
     def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
-        """Drift: output as rate less the model's rate; with distance from the trained box."""
-        values, full, settled = atoms
-        limited, outside = self.features_.limit(values, full, linear=True)
-        rate = self.regressor_.predict_unchecked(self._columns(np.column_stack((run.gyro, limited))))
-        measure = partial(distance_outside, values, outside, self.features_)
-        return Evaluation(run.gyro_deg_h - rate, full, settled, outside, measure)
-
-    def check_applies(self, run: Run, any_unit: bool = False) -> tuple[str, ...]:
-        """As for every model; besides, the output must be in the unit of training.
+        """Drift: output as rate less the model's rate; with distance from the trained box.
 
         Raises
         ------
         InputError
-            If unit or axis differ and `any_unit` is not set, or counts are mixed with deg/h.
+            If the output is not in the unit of training, counts or deg/h.
         """
-        notes = super().check_applies(run, any_unit)
         if run.gyro_unit != self.card_.gyro_unit:
             raise InputError(
                 f"{run.name}: column 'gyro' is in {run.gyro_unit}, the joint model was trained on "
                 f"{self.card_.gyro_unit} and works on the output as recorded; give the run in that unit"
             )
-        return notes
+        values, full, settled = atoms
+        limited, outside = self.features_.limit(values, full, linear=True)
+        rate = self.regressor_.predict_unchecked(self._columns(np.column_stack((run.gyro, limited))))
+        measure = partial(distance_outside, values, outside, self.features_)
+        return Evaluation(run.gyro_deg_h - rate, full, settled, outside, measure)
 
     @property
     def column_names(self) -> list[str]:

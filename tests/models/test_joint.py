@@ -128,7 +128,7 @@ def test_counts_are_taken_as_they_are():
     np.testing.assert_allclose(compensation.drift, counting.gyro_deg_h - compensation.compensated, atol=1e-9)
     assert model.describe()["coefficients"]["D"]["value"] == pytest.approx(1 / COUNT_PER_DEG_H, rel=1e-3)
     with pytest.raises(InputError, match=r"deg/h.*count"):
-        model.check_applies(run)
+        model.predict(run)
 
 
 def test_run_without_turns_is_refused():

@@ -226,7 +226,11 @@ def test_notes_on_use(train, other):
     notes = model.check_applies(other)
     assert any("the model states no unit" in note for note in notes)
     assert any("Earth rate" in note for note in notes)
-    assert make_model("polynomial").fit(train).check_applies(other) == ()
+    model, foreign = make_model("polynomial").fit(train), with_facts(other, unit="another")
+    assert model.check_applies(other) == ()
+    with pytest.raises(InputError, match="unit 'another', but the model was trained on"):
+        model.compensate(foreign)
+    assert np.array_equal(model.compensate(foreign, any_unit=True).drift, model.predict(foreign))
 
 
 def test_what_is_no_run_is_told_as_that() -> None:
