@@ -29,8 +29,10 @@ from fogml.report.inspect_page import temperature_rates
 from fogml.report.page import Drawing
 from fogml.report.plan_page import programme_drawing
 from fogml.report.style import segments_of, shade
+from fogml.report.sweep_page import pareto_front
 from fogml.runs.run import Run
 from tests.report.judgements import FLOOR, judged_run, judgement
+from tests.report.procedure_pages import written
 
 
 def traces(drawing: Drawing) -> dict[str, Any]:
@@ -280,3 +282,12 @@ def test_where_warming_and_cooling_part_is_where_both_were_seen() -> None:
     ]
     assert "from 10.0 to 20.0 °C: 0.400 deg/h" in _parted(bins)
     assert "in both directions" in _parted(bins[2:])
+
+
+def test_a_winner_without_operations_is_drawn_on_the_logarithmic_axis() -> None:
+    study = written("sweep")
+    (place,) = study["pareto"]
+    study["winner"] = study["trials"][place] = study["trials"][place] | {"operations": 0}
+    drawn = [t for t in pareto_front(study).figure.data if t.name in ("in the Pareto set", "winner")]
+    assert len(drawn) == 4
+    assert all(min(trace.x) > 0 for trace in drawn)
