@@ -121,10 +121,12 @@ class Sheet:
     def __init__(self, spool: Spool, rows: Any) -> None:
         self.content = Rows(spool, np.uint8)
         self.is_empty = True
+        self.durations: set[int] = set()
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         for row in _with_midnights(rows):
             writer.writerow([_cell(value) for value in row])
+            self.durations.update(i for i, value in enumerate(row) if isinstance(value, timedelta))
             if text.tell() > BLOCK_BYTES:
                 self.flush(text)
         self.flush(text)
@@ -154,6 +156,7 @@ class Workbook(Container):
 
         super().__init__()
         self.hidden: list[str] = []
+        self.durations: dict[str, list[int]] = {}
         self.is_uncalculated = UNCALCULATED in keys and _is_uncalculated(path)
         if UNCALCULATED in keys:
             return
@@ -165,11 +168,13 @@ class Workbook(Container):
                 sheet = Sheet(self.spool, held.iter_rows())
                 if not sheet.is_empty:
                     self.add("", name, None, sheet)
+                    self.durations[name] = sorted(sheet.durations)
 
     @property
     def told(self) -> dict[str, Any]:
-        """What the parent hears: also which sheets are hidden."""
-        return {**super().told, "hidden": self.hidden, UNCALCULATED: self.is_uncalculated}
+        """What the parent hears: also which sheets are hidden, and which columns are durations [s]."""
+        more = {"hidden": self.hidden, "durations": self.durations, UNCALCULATED: self.is_uncalculated}
+        return {**super().told, **more}
 
 
 def _is_uncalculated(path: str) -> bool:

@@ -99,8 +99,15 @@ class CsvDialect:
         return number(field, self.decimal, self.grouped)
 
 
-def csv_dialect(path: Path) -> CsvDialect:
+def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
     """Tell the dialect from a file's first lines.
+
+    Parameters
+    ----------
+    path
+        The file.
+    seconds
+        Places of columns that are in seconds whatever the header says.
 
     Raises
     ------
@@ -132,7 +139,8 @@ def csv_dialect(path: Path) -> CsvDialect:
         raise _no_text(path.name)
     rows = [fields_of(line, header.separator) for line in lines[header.data :] if line.strip()]
     marks = marks_of(source, rows, header.separator)
-    cells, stamps = _clock(header.cells, rows, marks)
+    named = (f"{parse_header(cell)[0]} [s]" if i in seconds else cell for i, cell in enumerate(header.cells))
+    cells, stamps = _clock(tuple(named), rows, marks)
     dialect = CsvDialect(
         source,
         header.separator,

@@ -60,14 +60,14 @@ def quotes_are_plain(lines: memoryview, separator: str) -> bool:
 _NO_BLANK = re.compile(rb"\S")
 
 
-def read_csv(path: Path, *, repair: bool) -> RawTable:
+def read_csv(path: Path, *, repair: bool, seconds: Collection[int] = ()) -> RawTable:
     """The table of a CSV file.
 
-    With `repair`, rows that can't be read are dropped and counted.
+    With `repair`, rows that can't be read are dropped and counted. `seconds` as in `csv_dialect`.
     """
     import pyarrow as arrow
 
-    dialect, notes = without_footer(csv_dialect(path))
+    dialect, notes = without_footer(csv_dialect(path, seconds))
     try:
         batches = list(_batches(dialect))
         if not any(batch.num_rows for batch in batches):
@@ -91,14 +91,16 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
     return next(whole.blocks(max(len(whole) - 1, 1))).noting([note])
 
 
-def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) -> Iterator[RawTable]:
+def csv_blocks(
+    path: Path, rows: int, columns: Collection[str] | None = None, seconds: Collection[int] = ()
+) -> Iterator[RawTable]:
     """The table of a CSV file in blocks of rows; no repair.
 
-    Only time, gyro and `columns` are read where these are given.
+    Only time, gyro and `columns` are read where these are given. `seconds` as in `csv_dialect`.
     """
     import pyarrow as arrow
 
-    dialect, notes = without_footer(csv_dialect(path).only(columns))
+    dialect, notes = without_footer(csv_dialect(path, seconds).only(columns))
     notes = [*_doubts(dialect), *(notes or note_of_end(dialect.source))]
     if (cut := cut_line(dialect.source, dialect.separator, dialect.decimal)) is not None:
         raise cut_error(path, cut)

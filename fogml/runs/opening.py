@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -50,6 +50,7 @@ class HeldText:
         away = weakref.finalize(self, held.close)
         self.path = held.enter_context(scratch_folder()) / path.name
         self.findings: tuple[Finding, ...] = ()
+        self.durations: Collection[int] = ()
         self._of = path, kind, limits
         try:
             self._unpack(path, kind, limits)
@@ -66,6 +67,7 @@ class HeldText:
                 _check_text(path, first)
             elif not has_rows(first):
                 self.check_values("")
+            self.durations = stored.told.get("durations", {}).get(array.name, ())
             if array.name in stored.told.get("hidden", ()):
                 message = (
                     f"the hidden sheet {quoted(array.name)} is read, as no sheet that is shown holds a run"
@@ -160,6 +162,11 @@ class Opened:
     kind: str
     path: Path
     within: HeldText | None = None
+
+    @property
+    def durations(self) -> Collection[int]:
+        """Places of columns that are durations, in seconds whatever their header says."""
+        return self.within.durations if self.within else ()
 
     @property
     def size_mb(self) -> float:

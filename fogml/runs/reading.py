@@ -219,7 +219,7 @@ def _read_table(file: Opened, repair: bool, limits: ReadingLimits) -> RawTable:
     if file.kind == "csv":
         from fogml.runs.csv_files import read_csv
 
-        return file.keeping(read_csv(file.path, repair=repair))
+        return file.keeping(read_csv(file.path, repair=repair, seconds=file.durations))
     (table,) = _table_blocks(file, None, None, limits)
     return table
 
@@ -232,7 +232,7 @@ def _table_blocks(
     if kind == "csv":
         from fogml.runs.csv_files import csv_blocks
 
-        return map(file.keeping, csv_blocks(path, rows or BLOCK_ROWS, columns))
+        return map(file.keeping, csv_blocks(path, rows or BLOCK_ROWS, columns, file.durations))
     if kind == "parquet":
         from fogml.runs.parquet_files import parquet_blocks
 

@@ -374,7 +374,7 @@ def test_a_line_of_a_workbook_is_the_row_that_its_program_shows(tmp_path, above)
 
 
 @pytest.mark.parametrize("header", ["Elapsed", "Elapsed [s]", "Elapsed [min]", "Time"])
-@pytest.mark.parametrize("shown", ["h:mm:ss", "mm:ss.0"])
+@pytest.mark.parametrize("shown", ["h:mm:ss", "mm:ss.0", "[h]:mm:ss", "[mm]:ss"])
 @pytest.mark.parametrize("step_s", [600.5, 3600.0, 40_000.5])
 def test_a_cell_of_hours_minutes_and_seconds_goes_on_past_a_day(tmp_path, header, shown, step_s):
     """As a date of 1900, which a program of tables makes of it."""
@@ -388,3 +388,20 @@ def test_a_cell_of_hours_minutes_and_seconds_goes_on_past_a_day(tmp_path, header
     book.save(tmp_path / "book.xlsx")
     run = read_run(tmp_path / "book.xlsx")
     np.testing.assert_allclose(run.time, seconds, atol=1e-5)
+
+
+def test_durations_of_a_profile_and_beside_a_clock_are_seconds(tmp_path):
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(["Zeit", "Rate", "Held [s]"])
+    for i in range(9):
+        sheet.append([timedelta(seconds=20 * i), 5.0 + 0.01 * i, timedelta(seconds=7 * i)])
+    book.save(tmp_path / "book.xlsx")
+    (tmp_path / "own.yaml").write_text(STAMPED.replace("unit: stamp", "unit: s"))
+    (run,) = import_recording(tmp_path / "book.xlsx", load_profile(str(tmp_path / "own.yaml")))
+    np.testing.assert_allclose(run.time, 20.0 * np.arange(9.0), atol=1e-6)
+    sheet["A1"], sheet["B1"] = "time", "gyro [deg/h]"
+    book.save(tmp_path / "book.xlsx")
+    run = read_run(tmp_path / "book.xlsx")
+    np.testing.assert_allclose(run.time, 20.0 * np.arange(9.0), atol=1e-6)
+    np.testing.assert_allclose(run.columns["Held"], 7.0 * np.arange(9.0), atol=1e-6)
