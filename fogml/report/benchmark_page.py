@@ -195,13 +195,16 @@ def _ratios(values: Mapping[str, Any]) -> Drawing:
 def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     told = values["round"]
     seed = "closed: kept by who made it" if told["closed"] else f"open, seed {told['seed']}"
+    groups = dict.fromkeys(case["group"] for case in values["cases"]["drift"].values())
+    made = "synthetic units of realities that share no code with the twin"
+    legs = "legs of recordings of MEMS units (no fibre-optic gyro) that ship, MIT licence"
+    data = dict.fromkeys(
+        made if group.startswith("synthetic, ") else legs if group.endswith(", MEMS") else group
+        for group in groups
+    )
     return [
         ("round", seed),
         ("SHA-256 of round.json", told["handout_sha256"]),
         ("made by, scored by", f"fogml {told['made_by']}, fogml {values['version']}"),
-        (
-            "data",
-            "synthetic units of realities that share no code with the twin; legs of recordings of MEMS units "
-            "(no fibre-optic gyro) that ship, MIT licence",
-        ),
+        ("data", "; ".join(data)),
     ]

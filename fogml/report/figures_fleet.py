@@ -17,7 +17,6 @@ from fogml.report.page import Drawing
 from fogml.report.style import log_axis
 
 _COLUMNS = 2
-_LABELS = 24
 _LONGEST_LABEL = 16
 """Characters of a serial number on an axis: written upright, 7 px each, they leave two thirds of the
 height of 360 px to the figure."""
@@ -90,10 +89,17 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
     names, labels = found["names"], found["units"]
     rows = -(-len(names) // _COLUMNS)
     figure = make_subplots(
-        rows=rows, cols=_COLUMNS, shared_xaxes=True, horizontal_spacing=0.13, vertical_spacing=0.12 / rows
+        rows=rows,
+        cols=_COLUMNS,
+        shared_xaxes=True,
+        horizontal_spacing=0.16,
+        vertical_spacing=0.24 / rows,
+        # Above the panels: beside one, on paper, it would lie on that to the left.
+        subplot_titles=["constant [deg/h]" if n == "1" else f"{n} [deg/h per its unit]" for n in names],
     )
+    figure.update_annotations(font_size=12)
     values, errors = np.array(found["values"]), np.array(found["se"])
-    for place, name in enumerate(names):
+    for place in range(len(names)):
         row, column = place // _COLUMNS + 1, place % _COLUMNS + 1
         mean, std = found["mean"][place], found["std"][place]
         bars = {"type": "data", "array": errors[:, place], "thickness": 1, "width": 2}
@@ -102,11 +108,12 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
         figure.add_trace(trace, row, column)
         for end in (mean - 2 * std, mean + 2 * std):
             figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=column)
-        title = "constant<br>[deg/h]" if name == "1" else f"{name}<br>[deg/h per its unit]"
-        figure.update_yaxes(title_text=title, title_font_size=12, tickformat=".3~g", row=row, col=column)
-    serial_axis(figure, labels)
+        figure.update_yaxes(tickformat=".3~g", row=row, col=column)
+    serial_axis(figure, labels, most=16)
     for row in range(1, rows):
         figure.update_xaxes(title_text="", row=row)
+    # Long ones would lie on each other; it is the same of all.
+    figure.update_xaxes(title_text="", col=2)
     style.styled(figure, 90 + 170 * rows)
     moving = [trend["name"] for trend in found["trends"] if trend["seen"]]
     told = f"Drift over serial numbers is seen in {', '.join(moving)}." if moving else "No drift is seen."
@@ -121,12 +128,12 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
     )
 
 
-def serial_axis(figure: go.Figure, labels: Sequence[str]) -> None:
-    """An axis of serial numbers, of which as many are written as there is room for.
+def serial_axis(figure: go.Figure, labels: Sequence[str], most: int = 24) -> None:
+    """An axis of serial numbers, of which as many are written as there is room for, `most` on paper.
 
     Of long ones what all begin with is written once, beside the axis, and of the rest the end.
     """
-    step = max(1, -(-len(labels) // _LABELS))
+    step = max(1, -(-len(labels) // most))
     ends = min(labels, default=""), max(labels, default="")
     shared = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], zip(*ends)))
     shared = shared.rstrip("0123456789") if len(labels) > 1 else ""

@@ -64,7 +64,25 @@ def fleet_values() -> dict[str, Any]:
         if place % 10 == 8:
             outcome |= {"job": "diagnose", "found": {**found, "diagnosis": diagnosed(place)}}
         outcomes.append(outcome)
-    return dict(finite_json(fleet_json(outcomes, {})))
+    return {**finite_json(fleet_json(outcomes, {})), "constants": constants_of_units(rng)}
+
+
+def constants_of_units(rng: np.random.Generator) -> dict[str, Any]:
+    """Constants of all units in a form of six terms, of sizes that differ as powers of T do."""
+    names = ["1", "T", "T^2", "T^3", "dT", "T*dT"]
+    sizes = np.array([1.0, -1e-2, 1e-4, -1e-6, 0.2, 5e-3])
+    values = sizes * rng.normal(1.0, 0.3, (UNITS, len(names)))
+    trend = {"per_unit": -1e-6, "probability": 0.5, "seen": False}
+    return {
+        "features": "T^1..3, dT, T*dT",
+        "names": names,
+        "units": [SERIAL.format(place) for place in range(UNITS)],
+        "values": values.tolist(),
+        "se": np.abs(0.1 * values).tolist(),
+        "mean": sizes.tolist(),
+        "std": np.abs(0.3 * sizes).tolist(),
+        "trends": [{"name": name, **trend} for name in names],
+    }
 
 
 @cache

@@ -41,9 +41,10 @@ def written(name: str) -> dict:
     return dict(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8")))
 
 
-def benchmark(serial: str) -> str:
+def benchmark(
+    serial: str, groups: tuple[str, str] = ("thermal cycle, MEMS", "synthetic, second reality")
+) -> str:
     """Entries that help and that do harm, with intervals and without, one of a long name."""
-    groups = ("thermal cycle, MEMS", "synthetic, second reality")
     drift = {
         name: [
             DriftMark(f"{k:04d}", groups[k % 2], 2.0, 2.0 * left * (1.0 + 0.3 * (k % 3)), 0.05, *stated)

@@ -253,3 +253,27 @@ def test_figures_are_printed_as_wide_as_the_sheet(browser) -> None:
     opened.printed()
     assert opened.console == ["figure 672"] * len(Page(html).figures)
     opened.close()
+
+
+@pytest.mark.parametrize("kind", ["fleet", "train", "gap", "index", "sweep"])
+def test_no_word_of_an_axis_lies_on_another_panel_on_paper(browser, kind) -> None:
+    """Beside a panel of two columns a title lay over the points of the one to its left."""
+    opened = browser(pages()[kind])
+    opened.on_paper(True)
+    over = opened.tell(
+        """Array.from(document.querySelectorAll(".plot")).flatMap(function (plot) {
+          var panels = Array.from(plot.querySelectorAll(".bglayer .bg, .draglayer .nsewdrag"));
+          var words = Array.from(plot.querySelectorAll(".ytick text, text[class^='y'][class$='title']"));
+          return words.filter(function (text) {
+            var own = text.getBoundingClientRect();
+            return panels.some(function (panel) {
+              var box = panel.getBoundingClientRect();
+              return own.width && own.right > box.left + 1 && own.left < box.right - 1 &&
+                own.bottom > box.top + 1 && own.top < box.bottom - 1;
+            });
+          }).map(function (text) { return text.textContent; });
+        })"""
+    )
+    panels = opened.tell("""document.querySelectorAll(".draglayer .nsewdrag").length""")
+    opened.close()
+    assert panels > 1 and not over

@@ -25,6 +25,7 @@ from fogml.runs.run import Run
 from fogml.signals.drawn import DRAWN_POINTS
 from tests.report.judgements import judged_run, judgement, linear_judgement
 from tests.report.pages import Page, every_page, noise_values, recorded_run
+from tests.report.procedure_pages import benchmark
 
 KINDS = ("train", "train of five", "compare", "inspect", "noise", "gap", "index", "certificate")
 pages = cache(every_page)
@@ -287,3 +288,12 @@ def test_samples_are_drawn_as_exactly_as_a_screen_shows(values: np.ndarray, kept
     told = np.frombuffer(base64.b64decode(y["bdata"]), dtype=y["dtype"])
     span = np.ptp(values[np.isfinite(values)]) if np.isfinite(values).any() else 1.0
     np.testing.assert_allclose(told, values, rtol=0.0, atol=1e-4 * span)
+
+
+def test_a_benchmark_tells_the_data_that_its_round_holds() -> None:
+    synthetic = benchmark("F-1", ("synthetic, first reality", "synthetic, second reality"))
+    own = benchmark("F-1", ("synthetic, first reality", "oven of bench 4"))
+    both = benchmark("F-1")
+    assert "MEMS units" in both and "synthetic units of realities" in both
+    assert "MEMS units" not in synthetic and "synthetic units of realities" in synthetic
+    assert "share no code with the twin; oven of bench 4" in own
