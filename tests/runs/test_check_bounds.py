@@ -19,12 +19,14 @@ BLOCK = 1024
 
 
 def samples_stuck(time, values, other):
-    """Samples of spells that last long enough while `other` moves, one spell after the other."""
+    """Samples of spells during which `other`, which rises, has been away long enough, one after the other."""
     count = begin = 0
-    for _, spell in groupby(values.tolist()):
+    for value, spell in groupby(values.tolist()):
         end = begin + len(list(spell))
-        moved = np.ptp(other[begin:end])
-        count += (end - begin) * (time[end - 1] - time[begin] > STUCK_S and moved > MOVED_DEGC)
+        away = [
+            t for t, x in zip(time[begin:end], other[begin:end]) if x > max(value, other[begin]) + MOVED_DEGC
+        ]
+        count += (end - begin) * (len(away) > 0 and time[end - 1] - away[0] > STUCK_S)
         begin = end
     return count
 
