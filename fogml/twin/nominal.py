@@ -10,13 +10,16 @@ DeltaT is the mean of T over the last 64 s less that over the 64 s before [degC]
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
+from numbers import Real
 
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.errors import InputError
 from fogml.twin.inputs import Inputs
-from fogml.twin.quantities import Quantity, check_all, limited
+from fogml.twin.quantities import Quantity, limited
 
 DELTA_WINDOW_S = 64.0
 DELTA = "DeltaT"
@@ -33,7 +36,7 @@ class NominalConstants:
     Raises
     ------
     InputError
-        If one is not physical.
+        If one is not a finite number. `QUANTITIES` limits what a twin has, not the steps of a fit.
     """
 
     e0: float = 0.0
@@ -46,7 +49,9 @@ class NominalConstants:
     m: float = 0.0
 
     def __post_init__(self) -> None:
-        check_all(self, QUANTITIES, "nominal")
+        for name, value in vars(self).items():
+            if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+                raise InputError(f"nominal: '{name}' is {value!r}; a number in {UNITS[name]} is needed")
 
 
 UNITS = {
@@ -59,7 +64,8 @@ UNITS = {
     "g": "deg/h/degC",
     "m": "deg/h/degC",
 }
-QUANTITIES: tuple[Quantity, ...] = tuple(limited(name, unit, -1e6, 1e6) for name, unit in UNITS.items())
+QUANTITIES: tuple[Quantity, ...] = tuple(limited(name, unit, -1e9, 1e9) for name, unit in UNITS.items())
+"""Limits are beyond an output of reversed sign, whose e0 is -2e6 ppm."""
 PRIOR_SD = NominalConstants(e0=500.0, k1=50.0, k2=0.5, b0=5.0, b1=0.05, b2=5e-4, g=0.5, m=2.0)
 """Standard deviations of the normal priors with mean 0."""
 NAMES = tuple(field.name for field in fields(NominalConstants))

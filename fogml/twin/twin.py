@@ -23,11 +23,11 @@ from fogml.errors import InputError, known_are, quoted
 from fogml.twin.coil import LayeredCoil
 from fogml.twin.effect import Effect, LoggerEffect, NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.noise import NoiseConstants
-from fogml.twin.nominal import PRIOR_SD, NominalConstants
+from fogml.twin.nominal import PRIOR_SD, QUANTITIES, NominalConstants
 from fogml.twin.optics import REFERENCE_COIL, Coil, Light, Receiver
 from fogml.twin.plant.coil import END_NODES, CoilEnds, with_ends
 from fogml.twin.plant.network import ThermalNetwork
-from fogml.twin.quantities import GRADES, Grade, limited
+from fogml.twin.quantities import GRADES, Grade, check_all, limited
 from fogml.twin.registry import catalogue_order, effect
 from fogml.twin.set_up import Plant, Sensors, Surroundings
 from fogml.twin.uncertainty import Suspected, Uncertainty
@@ -121,6 +121,7 @@ class Twin:
         LayeredCoil(self.coil)
         if self.grade not in GRADES:
             raise InputError(f"grade is {quoted(self.grade)}; known are {', '.join(GRADES)}")
+        check_all(self.nominal, QUANTITIES, "nominal")
         for name, deviation in vars(self.nominal_sd).items():
             if deviation < 0.0:
                 raise InputError(f"nominal: 'sd' of '{name}' is {deviation:g}; 0 or more is needed")

@@ -205,6 +205,7 @@ def test_what_makes_a_twin_in_python_comes_back_from_its_file(section, tmp_path)
         ({"noise_factor": {"N": math.nan}}, "'N': 'factor' is nan"),
         ({"grade": "lunar"}, "grade is 'lunar'"),
         ({"nominal_sd": NominalConstants(b0=-1.0)}, "'sd' of 'b0' is -1"),
+        ({"nominal": NominalConstants(g=-2e9)}, "nominal: 'g' is -2e\\+09 .*not physical"),
     ],
 )
 def test_what_no_file_can_hold_is_refused_in_python_too(change, message):
@@ -264,3 +265,9 @@ def test_numbers_of_numpy_make_a_twin_and_its_file(tmp_path):
 def test_a_constant_is_a_finite_number(value):
     with pytest.raises(InputError, match="a number in deg/h is needed"):
         load_twin("nominal").with_nominal(b0=value)
+
+
+def test_an_output_of_reversed_sign_is_a_twin_and_comes_back(tmp_path):
+    path = tmp_path / "twin.yaml"
+    save_twin(Twin(nominal=NominalConstants(e0=-2e6)), path)
+    assert load_twin(path).nominal.e0 == -2e6
