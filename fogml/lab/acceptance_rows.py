@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -159,9 +160,7 @@ class Limits:
     sha256: str | None = None
 
     def __post_init__(self) -> None:
-        for key in self.by_quantity:
-            if key not in BY_KEY:
-                raise InputError(f"no quantity {quoted(key)}; {known_are(str(key), BY_KEY)}")
+        _check_known(self.by_quantity)
 
 
 def read_limits(path: str | Path) -> Limits:
@@ -177,15 +176,20 @@ def read_limits(path: str | Path) -> Limits:
     if unknown := [key for key in values if key not in _KEYS]:
         known = known_are(str(unknown[0]), _KEYS, "known keys")
         raise InputError(f"{path.name}: unknown key {quoted(unknown[0])}; {known}")
-    found = {}
-    for key, stated in values["limits"].items():
-        if key not in BY_KEY:
-            raise InputError(f"{path.name}: no quantity {quoted(key)}; {known_are(str(key), BY_KEY)}")
-        found[key] = _limit(stated, f"{path.name}: limit of '{key}'")
+    _check_known(values["limits"], f"{path.name}: ")
+    found = {
+        key: _limit(stated, f"{path.name}: limit of '{key}'") for key, stated in values["limits"].items()
+    }
     names = {key: None if values.get(key) is None else str(values[key]) for key in ("customer", "document")}
     return Limits(
         found, names["customer"], names["document"], path.name, hashlib.sha256(path.read_bytes()).hexdigest()
     )
+
+
+def _check_known(keys: Iterable[Any], where: str = "") -> None:
+    for key in keys:
+        if key not in BY_KEY:
+            raise InputError(f"{where}no quantity {quoted(key)}; {known_are(str(key), BY_KEY)}")
 
 
 def _limit(stated: Any, what: str) -> Limit:

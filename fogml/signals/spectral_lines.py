@@ -28,8 +28,8 @@ def lines_of(
     offset: int,
     chance: float,
     *,
-    fewest: int = 32,
-    near: int = 50,
+    fewest: int,
+    near: int,
 ) -> tuple[BoolArray | None, list[SpectralLine]]:
     """Coefficients of sinusoids that stand out of their bins' noise, and what they are.
 

@@ -10,14 +10,11 @@ DeltaT is the mean of T over the last 64 s less that over the 64 s before [degC]
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
-from numbers import Real
 
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity, limited
 
@@ -49,9 +46,8 @@ class NominalConstants:
     m: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-                raise InputError(f"nominal: '{name}' is {value!r}; a number in {UNITS[name]} is needed")
+        for quantity in QUANTITIES:
+            quantity.check_finite(getattr(self, quantity.name), "nominal")
 
 
 UNITS = {

@@ -106,9 +106,7 @@ class Quantity:
         InputError
             If it is not a finite number within `limits`; the message names owner and key.
         """
-        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-            unit = "" if self.unit == "1" else f" in {self.unit}"
-            raise InputError(f"{owner}: '{self.name}' is {value!r}; a number{unit} is needed")
+        self.check_finite(value, owner)
         if self.whole and value != round(value):
             raise InputError(f"{owner}: '{self.name}' is {value:g}; a whole number is needed")
         low, high = self.limits
@@ -118,6 +116,12 @@ class Quantity:
                 f"it lies between {low:g} and {with_unit(high, self.unit)}"
             )
         return float(value)
+
+    def check_finite(self, value: float, owner: str) -> None:
+        """Raise an `InputError` as `check` does, if it is not a finite number, whatever the limits."""
+        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+            unit = "" if self.unit == "1" else f" in {self.unit}"
+            raise InputError(f"{owner}: '{self.name}' is {value!r}; a number{unit} is needed")
 
 
 def check_all(held: object, quantities: Iterable[Quantity], owner: str) -> None:

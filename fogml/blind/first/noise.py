@@ -17,7 +17,8 @@ from fogml.arrays import FloatArray
 from fogml.blind.frame.noise import States
 from fogml.blind.frame.operators import lag
 from fogml.blind.frame.record import World
-from fogml.blind.frame.thermometers import Instruments, Sensed, Thermometer, places_of
+from fogml.blind.frame.thermometers import places_of
+from fogml.blind.frame.unit import Instruments, Sensed, Thermometer
 
 _REST, _TURN, _LAGGING = 0.04, 0.3, 0.05
 """What the sensors' noise at rest, in turns, and their lag in turns may add, relative to white noise."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,56 +14,13 @@ from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.operators import late
 from fogml.blind.frame.record import World
 from fogml.blind.frame.strength import Scales
-from fogml.blind.frame.unit import Unit, UnitRun
+from fogml.blind.frame.unit import Instruments, Sensed, Thermometer, Unit, UnitRun
 
 _AT_REST, _IN_TURNS = 0.1, 0.4
 """What the thermometers' noise may add to the gyro's white noise in a sample, rms, in shares of it."""
 
 _LAG_D_PRIME = 1.0
 """Largest d' of what the thermometers' own lags do to a replay: where nothing is missing, nothing shows."""
-
-
-@dataclass(frozen=True)
-class Thermometer:
-    """Readings are (1 + ``gain``) T + ``offset`` degC of what it feels ``lag_s`` late."""
-
-    place: str
-    gain: float
-    offset: float
-    lag_s: float
-
-
-@dataclass(frozen=True)
-class Instruments:
-    """What is recorded of a unit, and how well.
-
-    Attributes
-    ----------
-    layout
-        Sensors on the coil: ``one`` for T, ``two`` for T_in and T_out, ``four`` for T1 to T4.
-    others
-        Further columns of the run format that are recorded.
-    noise, resolution
-        Of the temperature sensors [degC].
-    each
-        Thermometers by recorded name.
-    """
-
-    layout: str
-    others: tuple[str, ...]
-    noise: float
-    resolution: float
-    each: dict[str, Thermometer]
-
-    @property
-    def coil(self) -> dict[str, str]:
-        """Recorded coil sensors to the face each sits on."""
-        return {name: one.place for name, one in self.each.items() if name not in self.others}
-
-    @property
-    def two_faces(self) -> bool:
-        """Whether there is a sensor on the outer face."""
-        return self.layout != "one"
 
 
 def places_of(layout: str, others: Sequence[str]) -> dict[str, str]:
@@ -106,26 +63,6 @@ def draw_instruments(
     if not instruments.two_faces:
         constants = nominal.Constants(**(constants.as_dict() | {"g": 0.0}))
     return constants, instruments
-
-
-@dataclass(frozen=True, eq=False)
-class Sensed:
-    """What a run's thermometers feel, by recorded name [degC], shape (n,) each; their noise."""
-
-    felt: dict[str, FloatArray]
-    noise: dict[str, FloatArray]
-    instruments: Instruments
-
-    def recorded(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
-        """Recorded columns; of other `felt` temperatures with the same noise, if given."""
-        q, exact = self.instruments.resolution, self.exact(felt)
-        return {n: np.round(np.round((x + self.noise[n]) / q) * q, 7) for n, x in exact.items()}
-
-    def exact(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
-        """The same without noise and steps."""
-        each = self.instruments.each
-        held = self.felt if felt is None else felt
-        return {name: (1.0 + each[name].gain) * x + each[name].offset for name, x in held.items()}
 
 
 def sense(rng: np.random.Generator, world: World, instruments: Instruments) -> Sensed:

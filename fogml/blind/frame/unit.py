@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +15,68 @@ from fogml.blind.frame.form import Form
 from fogml.blind.frame.noise import NoiseLaw, Whitening
 from fogml.blind.frame.record import SetUp, World
 
-if TYPE_CHECKING:
-    from fogml.blind.frame.thermometers import Instruments, Sensed
+
+@dataclass(frozen=True)
+class Thermometer:
+    """Readings are (1 + ``gain``) T + ``offset`` degC of what it feels ``lag_s`` late."""
+
+    place: str
+    gain: float
+    offset: float
+    lag_s: float
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What is recorded of a unit, and how well.
+
+    Attributes
+    ----------
+    layout
+        Sensors on the coil: ``one`` for T, ``two`` for T_in and T_out, ``four`` for T1 to T4.
+    others
+        Further columns of the run format that are recorded.
+    noise, resolution
+        Of the temperature sensors [degC].
+    each
+        Thermometers by recorded name.
+    """
+
+    layout: str
+    others: tuple[str, ...]
+    noise: float
+    resolution: float
+    each: dict[str, Thermometer]
+
+    @property
+    def coil(self) -> dict[str, str]:
+        """Recorded coil sensors to the face each sits on."""
+        return {name: one.place for name, one in self.each.items() if name not in self.others}
+
+    @property
+    def two_faces(self) -> bool:
+        """Whether there is a sensor on the outer face."""
+        return self.layout != "one"
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What a run's thermometers feel, by recorded name [degC], shape (n,) each; their noise."""
+
+    felt: dict[str, FloatArray]
+    noise: dict[str, FloatArray]
+    instruments: Instruments
+
+    def recorded(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
+        """Recorded columns; of other `felt` temperatures with the same noise, if given."""
+        q, exact = self.instruments.resolution, self.exact(felt)
+        return {n: np.round(np.round((x + self.noise[n]) / q) * q, 7) for n, x in exact.items()}
+
+    def exact(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
+        """The same without noise and steps."""
+        each = self.instruments.each
+        held = self.felt if felt is None else felt
+        return {name: (1.0 + each[name].gain) * x + each[name].offset for name, x in held.items()}
 
 
 @dataclass(frozen=True, eq=False)
