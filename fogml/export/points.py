@@ -26,6 +26,8 @@ _LEAST_SPANS = 5.0
 _LEAST_SAMPLES, _MOST_SAMPLES = 4000, 40_000
 _MOST_FILLING = 4_000_000
 """Samples that a history is made longer by at most, so that its windows fill: 2000 s at 2 kHz."""
+_CROSSINGS = 8.0
+"""Times that a history of memories of turns could cross the box at its fastest rate."""
 _GYRO_DEG_H = 20.0
 """Outputs up to this size are compared; a joint model's scale factor by a point at 10 deg/s."""
 
@@ -88,8 +90,12 @@ class History:
 
 
 def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
-    """Ramps and soaks through the trained box and a little out of it, with gaps of all lengths."""
+    """Ramps and soaks through the trained box and a little out of it, with gaps of all lengths.
+
+    For memories of turns it begins with a sweep, after which they depend on nothing earlier.
+    """
     rng = np.random.default_rng([seed, 2])
+    swept = any(atom.settles for atom in plan.atoms)
     spans = [atom.window.span_s for atom in plan.atoms if atom.window]
     spans += [
         EXPONENTIAL_SPAN * (declared.time_s(atom.given) or 0.0)
@@ -101,8 +107,11 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     # So long in any case that windows fill, and go on after a gap.
     count = max(count, least, min(round(_LEAST_SPANS * longest / plan.sample_s), _MOST_FILLING))
     step = plan.sample_s
-    time = step * np.arange(count)
     ranges = [sensor_range(plan, sensor) for sensor in plan.sensors]
+    if swept:
+        crossing = max(60.0 * (high - low) / (fastest * step) for low, high, fastest in ranges)
+        count = max(count, min(round(_CROSSINGS * crossing), _MOST_SAMPLES))
+    time = step * np.arange(count)
     paths: FloatArray = np.empty((count, len(ranges)))
     for i, (low, high, fastest) in enumerate(ranges):
         span = high - low
@@ -111,7 +120,7 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
             paths[:, i] = np.linspace(low, high + 0.1 * span, count)
             continue
         if i == 0 or not is_temperature(plan.sensors[i]):
-            paths[:, i] = _walk(rng, count, step, low - 0.1 * span, high + 0.1 * span, speed)
+            paths[:, i] = _walk(rng, count, step, low - 0.1 * span, high + 0.1 * span, speed, swept)
             continue
         # Sensors of one gyro move together; how far apart is told by their difference, or by their ranges.
         first_low, first_high, _ = ranges[0]
@@ -147,15 +156,23 @@ def reached_points(plan: Plan, seed: int, box_share: float = 0.25) -> tuple[Floa
 
 
 def _walk(
-    rng: np.random.Generator, count: int, step_s: float, low: float, high: float, speed: float
+    rng: np.random.Generator, count: int, step_s: float, low: float, high: float, speed: float, swept: bool
 ) -> FloatArray:
-    """A path of ramps at speeds up to `speed` [degC/s] and of soaks, within bounds."""
-    rates = np.empty(0)
+    """A path of ramps at speeds up to `speed` [degC/s] and of soaks, within bounds.
+
+    A sweep up, then down to where they begin, takes at most half of it, faster than `speed` where it must.
+    """
+    start, rates = rng.uniform(low, high), np.empty(0)
+    if swept:
+        ways = np.array([high - low, start - high])
+        lengths = np.clip(np.abs(ways) / (speed * step_s), 1, count // 4).astype(int)
+        rates = np.repeat(ways / (lengths * step_s), lengths)
+        start = low
     while len(rates) < count:
         length = int(rng.integers(count // 40 + 2, count // 10 + 3))
         rate = 0.0 if rng.random() < 0.2 else float(rng.uniform(0.2, 1.1) * speed * rng.choice([-1.0, 1.0]))
         rates = np.append(rates, np.full(length, rate))
-    path = np.cumsum(rates[:count]) * step_s + rng.uniform(low, high)
+    path = np.cumsum(rates[:count]) * step_s + start
     folded = np.mod(path - low, 2.0 * (high - low))
     return np.asarray(low + np.minimum(folded, 2.0 * (high - low) - folded))
 

@@ -157,4 +157,4 @@ def sensor_range(plan: Plan, sensor: str) -> tuple[float, float, float]:
             per_minute = 60.0 / seconds if atom.operator == "diff" else 1.0
             fastest = min(fastest, max(abs(end) for end in ends) * per_minute / total)
     usual = _USUAL_RATE if is_temperature(sensor) else (high - low) / 15.0
-    return low, high, fastest if np.isfinite(fastest) else usual
+    return low, high, fastest if 0.0 < fastest < np.inf else usual

@@ -15,6 +15,7 @@ import numpy as np
 from fogml.errors import InputError, known_are
 from fogml.runs.columns import KNOWN, REPLAYED, coil_sensor_number, header, is_temperature
 from fogml.runs.facts import Facts, ScaleFactor
+from fogml.runs.possible import check_columns
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.chain import ChainOutput
 from fogml.twin.programme import Programme, load_programme
@@ -86,9 +87,8 @@ def simulate(
     columns
         What to record beside time and gyro, by the run format's names; `DEFAULT_COLUMNS` if None.
     facts
-        Set-up facts; if None latitude 39.9 deg, and an input axis that is up. Unless stated, that is as the
-        programme says, the unit is the twin's name and the notes say what was simulated; power-on is the
-        programme's.
+        Set-up facts; if None latitude 39.9 deg and an input axis that is up. Unless stated, that and power-on
+        are as the programme says, the unit is the twin's name and the notes say what was simulated.
     truth
         Whether to keep every node and every effect's contribution, as the run before has to have done.
     after
@@ -111,10 +111,9 @@ def simulate(
     world = world_of(
         programme, twin, sample_s, seed, columns, facts, truth=truth, before=before, storage=storage
     )
-    length = len(world.timeline)
     kept: dict[str, FloatArray] = {}
     kept_truth: dict[str, FloatArray] = {}
-    rows = 0
+    length, rows = len(world.timeline), 0
 
     def keep(recorded: dict[str, FloatArray], true: Truth | None) -> None:
         nonlocal rows
@@ -131,7 +130,8 @@ def simulate(
     if not rows:
         raise _never_on(world)
     columns_kept = {name: values[:rows] for name, values in kept.items()}
-    run = Run(world.twin.name, columns_kept, world.facts, world.gyro_unit)
+    check_columns(world.twin.name, columns_kept)
+    run = Run.derived(world.twin.name, columns_kept, world.facts, world.gyro_unit)
     if not truth:
         return Simulation(run, None, world)
     from fogml.twin.truth import truth_from_columns

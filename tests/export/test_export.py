@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from experiments.synthetic_world import World, cycle
 from fogml.errors import InputError
 from fogml.export.c_float import literal
 from fogml.export.check import training_rows
@@ -46,13 +47,22 @@ def test_the_plain_form_is_the_model(model_of, name):
     np.testing.assert_array_equal(flag, expected.flag)
 
 
-@pytest.mark.parametrize("name", ["polynomial", "rich", "rbf", "joint"])
+@pytest.mark.parametrize("name", ["polynomial", "rich", "rbf", "joint", "memory"])
 def test_histories_go_through_the_trained_box(model_of, name):
     plan = Plan.of(model_of(name))
     past = history(plan, 0)
     _, flag = plan.compensated(past.atoms(plan), past.gyro)
     assert np.mean(flag == 0) > 0.1
     assert np.any(flag == 1) and np.any(flag == 2)
+
+
+def test_memories_of_turns_settle_in_a_history() -> None:
+    """At the pace of its ramps an hour's walk would not move far enough for a play of 60 degC to settle."""
+    run, _ = World(noise=0.05).run(cycle(0.7, 2.0)[::2], 2.0, 1, "slow.csv")
+    plan = Plan.of(make_model("polynomial", features="T_in, dT_in, play(T_in, 30 degC)").fit(run))
+    for seed in range(3):
+        past = history(plan, seed)
+        assert np.mean(plan.compensated(past.atoms(plan), past.gyro)[1] == 0) > 0.1
 
 
 @pytest.mark.parametrize("to", ["json", "mat"])

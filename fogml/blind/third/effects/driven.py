@@ -144,13 +144,13 @@ class LagBesideContact(Sensing):
 
 
 class StepsThatStick(Sensing):
-    """A converter with a hysteresis of one step: it moves on only when half a step beyond."""
+    """A converter with hysteresis: its code moves on only when the value is most of a step away."""
 
     name, form, unit = "sensor_quantisation", "sticking steps", "degC"
     greatest: ClassVar[float] = 2.0
 
     def read(self, values: FloatArray, amplitude: float, shape: Shape) -> FloatArray:
-        """The code held until the value is a whole step away."""
+        """The code held until the value is 0.8 steps away."""
         held, out = float(np.round(values[0] / amplitude)), np.empty(len(values))
         for k, value in enumerate((values / amplitude).tolist()):
             if abs(value - held) > 0.8:
