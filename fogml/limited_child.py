@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import resource
+import signal
 import sys
 
 
@@ -28,6 +29,8 @@ def become(cpu_s: str, memory_bytes: str, output_bytes: str, *words: str) -> Non
         if most != resource.RLIM_INFINITY:
             limit, last = min(limit, most), min(last, most)
         resource.setrlimit(kind, (limit, last))
+    # Python ignores it, and so would what it becomes: writes beyond the limit would fail one by one.
+    signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
     os.execvp(words[0], words)
 
 

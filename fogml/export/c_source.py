@@ -156,7 +156,7 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "other_inputs": [name for name in plan.sensors if not is_temperature(name)],
         "atoms": plan.atoms,
         "sample_s": repr(plan.sample_s),
-        "spare": _spare(plan, windows),
+        "faster": _faster(plan, windows),
         "noise_ticks": NOISE_TICKS,
         "bin_ticks": round(windows.bin_samples * plan.sample_s / windows.tick_s),
         "sample_us": round(plan.sample_s * 1e6),
@@ -202,7 +202,7 @@ def _clock_constants(windows: Layout, sample_s: float, dtype: str) -> list[str]:
         lines.append(
             f"#define LEAST_CUBED {share} /* variance of a full window's rate to that of the rates */"
         )
-    if longest >= 1 << 31:
+    if 32 not in windows.clock_bits:
         lines += ["#ifdef FOGML_CLOCK_32", "#error a window spans more than a 32-bit clock tells", "#endif"]
     if windows.binned:
         ticks = (windows.bin_samples - 0.5) * sample_s / windows.tick_s
@@ -218,12 +218,14 @@ def _clock_constants(windows: Layout, sample_s: float, dtype: str) -> list[str]:
     return [CCode(line) for line in lines]
 
 
-def _spare(plan: Plan, windows: Layout) -> int:
-    """By how many per cent samples may come faster than nominal before a ring is too short."""
+def _faster(plan: Plan, windows: Layout) -> str:
+    """How much faster than nominal samples may come before a ring, or the count of a bin, is too short."""
     if not windows.ring:
-        return 100
+        return "100 %"
+    if windows.binned:
+        return f"{MOST_IN_BIN // windows.bin_samples} times"
     longest = max(o.window.span_s for o in windows.operators if o.held >= 0)
-    return int(np.floor(100.0 * ((windows.ring - 1) * plan.sample_s / longest - 1.0)))
+    return f"{int(np.floor(100.0 * ((windows.ring - 1) * plan.sample_s / longest - 1.0)))} %"
 
 
 def units_of(plan: Plan, gyro: str, temperature: str) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.escaping import c_text
-from fogml.export.number_files import formula_of
+from fogml.export.number_files import EDGE, formula_of
 from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
 from fogml.export.static_curve import at_rest
@@ -93,6 +93,7 @@ def documentation(model: DriftModel, plan: Plan | None = None) -> str:
         f"fogml        {card['fogml_version']}",
         "",
         f"formula      {formula_of(plan)[1]}",
+        *([f"             {EDGE}"] if plan.edge_columns else []),
         *([] if plan.gives_rate else ["             compensated = gyro - drift, all in deg/h"]),
         "",
         "coefficients",
@@ -142,6 +143,9 @@ def _coefficients(plan: Plan) -> list[str]:
             unit = units[k].removeprefix("/").strip("()")
             rows.append((f"centres[{j}][{d}]", float(arrays["centres"][j][d]), unit, plan.names[k]))
             rows.append((f"widths[{j}][{d}]", float(arrays["widths"][j][d]), unit, plan.names[k]))
+    for r, k in enumerate(plan.edge_columns):
+        unit = units[k].removeprefix("/").strip("()")
+        rows += [(f"edge[{end}][{r}]", float(plan.edge[end, r]), unit, plan.names[k]) for end in (0, 1)]
     return [f"  {name:<14} {value!r:>24}  {unit:<24} {of}" for name, value, unit, of in rows]
 
 

@@ -45,7 +45,7 @@ from fogml.numerals import short
 from fogml.outputs import scratch_folder
 from fogml.runs.run import Run
 
-CLOCK = {"unit": "us", "bits": [64, 32], "wraps": True, "longest_uptime_s": None}
+CLOCK = {"unit": "us", "wraps": True, "longest_uptime_s": None}
 """C code's clock: unsigned, of which only differences are taken, so that uptime is unlimited (None)."""
 _PLAN_NOISE = 1e-9
 
@@ -174,7 +174,8 @@ def _write_c(
             size["instructions_per_sample"] = instructions_per_sample(source, scratch)
     write_files(files, folder)
     fixed = source.numbers["fixed"]
-    report: dict[str, Any] = {"difference": difference, "cortex_m4": size, "clock": CLOCK}
+    clock = {**CLOCK, "bits": source.layout.clock_bits}
+    report: dict[str, Any] = {"difference": difference, "cortex_m4": size, "clock": clock}
     report |= {} if false is None else {"false_readings": false}
     windows = source.layout
     if windows.binned:

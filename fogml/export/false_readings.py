@@ -17,6 +17,8 @@ from fogml.runs.columns import is_temperature
 
 SECONDS = (0.0, 60.0, 300.0)
 """Times without a good reading [s] that the error is stated after."""
+TURNING_DEG_S = 10.0
+"""Rate [deg/s] that it is stated at, too, of a model with a scale factor, beside that of a gyro at rest."""
 _POINTS, _MOST_SIGNS = 256, 32
 _ALL = {"block": 2.0, "slope": 3.0, "exp": 2.0}
 # Sum of the sizes of a window's weights, times its length: no false readings can move it further.
@@ -24,7 +26,9 @@ _ONE = {"block": 1.0, "slope": 6.0}
 # Largest of those weights, times the square of its length and over the sample interval.
 
 
-def false_reading_error(plan: Plan, seconds: float = 0.0, *, spell: bool, seed: int = 0) -> float:
+def false_reading_error(
+    plan: Plan, seconds: float = 0.0, *, spell: bool, seed: int = 0, turning_deg_s: float = 0.0
+) -> float:
     """Largest error of the drift at flag 0 that false readings make which pass as heat [deg/h].
 
     Each may be off by what the rule of readings allows (`DropoutRule.off_degC`), in any sense. How far an
@@ -41,6 +45,8 @@ def false_reading_error(plan: Plan, seconds: float = 0.0, *, spell: bool, seed: 
         Whether all that windows hold and memories took in may be false, or one reading alone.
     seed
         Seed of the points.
+    turning_deg_s
+        Rate that the gyro turns at, either way [deg/s]; it matters to a model with a scale factor alone.
     """
     off = plan.thermometer.off_degC(plan.sample_s + seconds)
     shift = np.array([off * atom_gain(atom, plan.sample_s, spell) for atom in plan.atoms])
@@ -50,13 +56,16 @@ def false_reading_error(plan: Plan, seconds: float = 0.0, *, spell: bool, seed: 
     low, high = plan.limits.box_low, plan.limits.box_high
     rng = np.random.default_rng([seed, 3])
     points = np.concatenate([box_points(plan, seed, count=_POINTS), _corners(low, high, rng)])
-    none, worst = np.zeros(len(points)), 0.0
-    before = plan.value(plan.full_columns(points), none)
+    columns, worst = plan.full_columns(points), 0.0
+    turning = 3600.0 * turning_deg_s / plan.arrays["scale"][0] if plan.gives_rate else 0.0
+    outputs = [np.full(len(points), output) for output in {turning, -turning}]
+    before = [plan.value(columns, output) for output in outputs]
     for signs in _signs(len(moved), rng):
         false = points.copy()
         false[:, moved] += signs * shift[moved]
-        after = plan.value(plan.full_columns(np.clip(false, low, high)), none)
-        worst = max(worst, float(np.abs(after - before).max()))
+        taken = plan.full_columns(np.clip(false, low, high))
+        for output, sound in zip(outputs, before, strict=True):
+            worst = max(worst, float(np.abs(plan.value(taken, output) - sound).max()))
     return worst
 
 
@@ -65,16 +74,26 @@ def false_readings(plan: Plan, seed: int = 0) -> dict[str, Any] | None:
     if not any(is_temperature(name) for name in plan.sensors):
         return None
     rule = plan.thermometer
+
+    def errors(name: str, seconds: float, turning_deg_s: float) -> dict[str, float]:
+        return {
+            f"{which}_{name}": false_reading_error(
+                plan, seconds, spell=which == "spell", seed=seed, turning_deg_s=turning_deg_s
+            )
+            for which in ("one", "spell")
+        }
+
     return {
         "step_degC": rule.jump_degC,
         "rate_degC_s": rule.rate_degC_s,
         "spell_s": rule.spell_s,
+        **({"turning_deg_s": TURNING_DEG_S} if plan.gives_rate else {}),
         "largest_error": [
             {
                 "missing_s": seconds,
                 "off_degC": rule.off_degC(plan.sample_s + seconds),
-                "one_deg_h": false_reading_error(plan, seconds, spell=False, seed=seed),
-                "spell_deg_h": false_reading_error(plan, seconds, spell=True, seed=seed),
+                **errors("deg_h", seconds, 0.0),
+                **(errors("turning_deg_h", seconds, TURNING_DEG_S) if plan.gives_rate else {}),
             }
             for seconds in SECONDS
         ],
@@ -86,7 +105,7 @@ def false_reading_lines(told: dict[str, Any] | None) -> list[str]:
     if told is None:
         return []
     first, *_, last = told["largest_error"]
-    return [
+    lines = [
         f"readings      believed within {short(told['step_degC'])} degC and {short(told['rate_degC_s'])} "
         "degC/s of the last good one;",
         f"              a false one that passes is off by up to {short(first['off_degC'])} degC and "
@@ -96,6 +115,13 @@ def false_reading_lines(told: dict[str, Any] | None) -> list[str]:
         f"              after {last['missing_s']:g} s without a good one {short(last['off_degC'])} degC, "
         f"{short(last['one_deg_h'])} and {short(last['spell_deg_h'])} deg/h",
     ]
+    if "turning_deg_s" in told:
+        soon, late = (
+            f"{short(part['one_turning_deg_h'])} and {short(part['spell_turning_deg_h'])} deg/h"
+            for part in (first, last)
+        )
+        lines.append(f"              at rest; turning at {told['turning_deg_s']:g} deg/s {soon}, then {late}")
+    return lines
 
 
 def atom_gain(atom: Atom, sample_s: float, spell: bool) -> float:

@@ -297,4 +297,6 @@ def fixed_point_lines(proven: float | None, plan: Plan) -> list[str]:
             "              export.json has what was measured",
         ]
     told = f"worst case    fixed point is at most {short(proven)} deg/h off in the trained box, by proof"
+    if plan.gives_rate:
+        told += f" of outputs up to {_GYRO_DEG_H:g} deg/h"
     return [told, "              where its windows of one's own are full"] if filling else [told]

@@ -26,7 +26,7 @@ from fogml.signals.clock import (
 
 Number = Literal["float64", "float32", "fixed"]
 
-TEMPERATURE_BITS = {"float64": 32, "float32": 22, "fixed": 20}
+TEMPERATURE_BITS = {"float64": 27, "float32": 22, "fixed": 20}
 """Held temperatures are multiples of 2**-bits degC."""
 RANGE_BITS = 9
 """Temperatures up to 2**9 degC either way are taken."""
@@ -130,6 +130,11 @@ class Layout:
     def tick_s(self) -> float:
         """Length of a tick [s]."""
         return self.tick_us * 1e-6
+
+    @property
+    def clock_bits(self) -> list[int]:
+        """Bits of the clocks of microseconds that tell its longest gap."""
+        return [64, 32] if self.longest_gap_s * 1e6 < 2.0**31 else [64]
 
     def of_method(self, method: str) -> list[tuple[int, Operator]]:
         """Operators of a method with their places."""

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
+from fogml.export import c_program
 from fogml.export.c_fixed import EXP_ERROR as FIXED_EXP_ERROR
 from fogml.export.c_float import EXP_ERROR
 from fogml.export.c_program import (
@@ -25,7 +26,10 @@ from fogml.export.c_program import (
 )
 from fogml.export.c_source import c_source
 from fogml.export.check import c_difference, expected_outputs
+from fogml.export.export import export_model
 from fogml.export.plan import Plan
+from fogml.export.settings import ExportSettings
+from fogml.limited import ProgramLimits
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
 from fogml.runs.run import Run
@@ -532,3 +536,88 @@ def test_an_output_that_is_no_number_stays_one_for_that_sample_alone(model_of, t
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(found)), [30])
     np.testing.assert_array_equal(np.delete(found, 30), np.delete(sound, 30))
     assert "no number (NaN) is given as one" in source.files["fogml_model.h"]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "q31"])
+def test_a_clock_that_comes_round_while_readings_are_lost_shows_no_time_that_passed(
+    model_of, tmp_path, dtype
+):
+    """Lost for 71 minutes and 35 seconds, after which a counter of 32 bits shows what it did before."""
+    source = c_source(Plan.of(model_of("polynomial"), 30.0), dtype, [])
+    time = 30_000_000 * np.arange(300, dtype=np.int64)
+    T = np.where(np.arange(300) < 50, 20.0, 45.0)
+    T[50:194] = -127.0
+    if source.numbers["fixed"]:
+        T = np.round(T / source.numbers["fixed"]["temperature_value"])
+    answers = [
+        CProgram(source, tmp_path, flags=(*QUICK, *clock)).steps(time, T[:, None], np.zeros(300))
+        for clock in ((), ("-DFOGML_CLOCK_32",))
+    ]
+    assert answers[0][1][192:200].tolist() == [2, 2, 2, 2, 2, 2, 0, 0]
+    for wide, short in zip(*answers):
+        np.testing.assert_array_equal(short, wide)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "q31"])
+def test_a_time_that_repeats_changes_no_other_sample(model_of, tmp_path, dtype):
+    source = c_source(Plan.of(model_of("memory"), 0.5), dtype, [])
+    program = CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW)
+    time = 500_000 * np.arange(6000, dtype=np.int64)
+    T = 20.0 + 25.0 * np.sin(np.arange(6000) / 600.0)
+    temperatures = np.column_stack([T, T - 1.0])
+    if source.numbers["fixed"]:
+        temperatures = np.round(temperatures / source.numbers["fixed"]["temperature_value"])
+    out, flag = program.steps(time, temperatures, np.zeros(6000))
+    twice = np.sort(np.append(np.arange(6000), np.arange(0, 6000, 7)))
+    again = np.flatnonzero(np.diff(twice, prepend=-1) == 0)
+    late, flag_late = program.steps(time[twice], temperatures[twice], np.zeros(len(twice)))
+    np.testing.assert_array_equal(np.delete(late, again), out)
+    np.testing.assert_array_equal(np.delete(flag_late, again)[1:], flag[1:])
+    np.testing.assert_array_equal(late[again], late[again - 1])
+    assert np.all(flag_late[again] == 2) and np.any(flag < 2)
+
+
+def test_a_window_that_a_short_clock_can_not_tell_is_for_the_long_one_alone(tmp_path):
+    for hours, bits in ((2.0, [64, 32]), (3.0, [64])):
+        model = make_model("polynomial", features=f"T_in, lag(T_in, {3600 * hours:g} s)").fit(training_run())
+        report = export_model(model, tmp_path, ExportSettings("c", sample_s=60.0, tolerance=1.0))
+        assert report["clock"]["bits"] == bits
+        compiled = subprocess.run(
+            ["gcc", "-DFOGML_CLOCK_32", "-fsyntax-only", str(tmp_path / "fogml_model.c")], capture_output=True
+        )
+        assert (compiled.returncode == 0) == (32 in bits)
+
+
+def test_as_much_faster_as_the_header_says_is_taken(model_of, tmp_path):
+    """Bins that samples fill before their time are too few for a window."""
+    source = c_source(Plan.of(model_of("polynomial"), 0.004), "float32", [])
+    times = int(re.search(r"up to (\d+) times faster", source.files["fogml_model.h"])[1])
+    program = CProgram(source, tmp_path)
+    for faster, expected in ((times, 0), (2 * times, 2)):
+        interval_us = 4000 // faster
+        count = 130_000_000 // interval_us
+        T = np.full((count, 1), 20.0)
+        _, flag = program.steps(interval_us * np.arange(count, dtype=np.int64), T, np.zeros(count))
+        assert flag[-1] == expected
+
+
+def test_instructions_of_a_model_that_takes_too_many_are_not_counted(model_of, tmp_path, monkeypatch):
+    if shutil.which("arm-none-eabi-gcc") is None or shutil.which("qemu-arm") is None:
+        pytest.skip("arm-none-eabi-gcc or qemu-arm is not installed")
+    source = c_source(Plan.of(model_of("rbf")), "float32", [])
+    assert instructions_per_sample(source, tmp_path) > 1000
+    monkeypatch.setattr(c_program, "COMPILING", ProgramLimits(output_bytes=1 << 20))
+    assert instructions_per_sample(source, tmp_path) is None
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32", "q31"])
+def test_sums_of_a_bin_fit_however_fast_its_temperature_changes(tmp_path, dtype):
+    """A bin of 7032 samples within which a thermometer goes through all of its range."""
+    model = make_model("polynomial", features="T_in, dT_in[block, 900 s], dT_in[slope, 1800 s]")
+    source = c_source(Plan.of(model.fit(training_run()), 0.004), dtype, [])
+    program = CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW)
+    T = -99.0 + 0.05 * np.abs(np.mod(np.arange(20_000), 12_000) - 6000.0)
+    if source.numbers["fixed"]:
+        T = np.round(T / source.numbers["fixed"]["temperature_value"])
+    _, flag = program.steps(4000 * np.arange(20_000, dtype=np.int64), T[:, None], np.zeros(20_000))
+    assert source.layout.bin_samples == 7032 and np.all(flag == 2)

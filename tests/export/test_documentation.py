@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from fogml.export.documentation import documentation, documentation_or_none
+from fogml.export.number_files import EDGE
+from fogml.export.plan import Plan
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, model_hash, save_model
 from fogml.runs.facts import Facts
@@ -79,3 +81,13 @@ def test_what_has_no_compact_form_has_none(model_of):
         run
     )
     assert documentation_or_none(tree) is None
+
+
+def test_a_networks_edge_stands_with_its_coefficients(model_of):
+    plan, text = Plan.of(model_of("rbf")), documentation(model_of("rbf"))
+    rows = {row[0]: row for row in coefficients(text)}
+    assert EDGE in text and EDGE not in documentation(model_of("polynomial"))
+    for r, column in enumerate(plan.edge_columns):
+        for end in (0, 1):
+            assert float(rows[f"edge[{end}][{r}]"][1]) == plan.edge[end, r]
+            assert rows[f"edge[{end}][{r}]"][3] == plan.names[column]

@@ -11,6 +11,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 
 from experiments.synthetic_world import World, cycle
 from fogml.errors import InputError
@@ -79,18 +80,67 @@ def test_number_files_hold_the_model(model_of, tmp_path, name, to, dtype):
     assert report["files"] == sorted([*files[to], "fogml_model.txt"])
 
 
-def test_json_alone_is_enough_to_compute_the_drift(model_of, tmp_path):
-    model = model_of("rbf")
-    export_model(model, tmp_path, ExportSettings("json", "float64"))
-    held = json.loads((tmp_path / "fogml_model.json").read_text())
-    arrays = {name: np.array(entry["values"]) for name, entry in held["arrays"].items()}
+def by_hand(held, arrays, atoms, gyro):
+    """Value of a file's numbers at limited atoms (n, a), by what it says of formula, edge and composition."""
+    columns = []
+    for feature in held["features"]:
+        value = np.ones(len(atoms)) if feature["column"] is None else columns[feature["column"]]
+        columns.append(value * np.prod(atoms[:, feature["times_atoms"]], axis=1))
+    f = np.column_stack(columns)
+    value = arrays["constant"] + f @ arrays["linear"]
+    if held["form"] == "joint":
+        s = arrays["scale"]
+        return (s[0] + s[1] * f[:, 0] + s[2] * f[:, 0] ** 2) * gyro + value
+    if held["form"] == "linear":
+        return value
+    drawn = f.copy()
+    for row in drawn:
+        shares = [1.0]
+        for low, high, k in zip(*held["edge"], held["edge_columns"]):
+            if not low <= row[k] <= high:
+                shares.append((high if row[k] > 0.0 else low) / row[k])
+        row[held["edge_columns"]] *= min(shares)
+    x, own = drawn[:, None, held["network_columns"]], f[:, None, held["network_columns"]]
+    away, width = x - arrays["centres"], arrays["widths"]
+    slope = 1.0 - 2.0 * np.sum(away * (own - x) / width**2, axis=2)
+    return value + (np.exp(-np.sum((away / width) ** 2, axis=2)) * slope) @ arrays["weights"]
+
+
+@pytest.mark.parametrize("name", ["polynomial", "memory", "rbf", "joint"])
+def test_the_file_alone_is_enough_to_compute_the_drift(model_of, tmp_path, name):
+    """In JSON and in MATLAB's, beyond the trained box and a network's edge, too."""
+    model = model_of(name)
     plan = Plan.of(model)
-    # Well within the trained rates: beyond them the network goes on along its slope.
-    f = plan.compose(box_points(plan, 1, count=50) * [0.9, 0.3])
-    x = f[:, held["network_columns"]]
-    z = (x[:, None] - arrays["centres"]) / arrays["widths"]
-    drift = arrays["constant"] + f @ arrays["linear"] + np.exp(-(z**2).sum(axis=2)) @ arrays["weights"]
-    np.testing.assert_allclose(drift, model.regressor_.predict(f), atol=1e-9)
+    for to in ("json", "mat"):
+        export_model(model, tmp_path, ExportSettings(to, "float64"))
+    held = json.loads((tmp_path / "fogml_model.json").read_text())
+    arrays = {array: np.array(entry["values"]) for array, entry in held["arrays"].items()}
+    given = box_points(plan, 1, beyond=1.0, count=400)
+    gyro = np.linspace(-9.0, 9.0, 400)
+    low, high, margin = (np.array([atom[end] for atom in held["atoms"]]) for end in ("low", "high", "margin"))
+    past = np.maximum(np.maximum(given - high, low - given), 0.0)
+    atoms = np.clip(given, low, high) + np.sign(given - low) * margin * past / (margin + past)
+    expected = plan.value(plan.full_columns(given), gyro)
+    np.testing.assert_allclose(by_hand(held, arrays, atoms, gyro), expected, atol=1e-9)
+    assert {atom["operator"] for atom in held["atoms"]} == set(held["operators"])
+    assert {atom["window"]["method"] for atom in held["atoms"] if atom["window"]} == set(held["windows"])
+    # In MATLAB's file a feature is a product of powers.
+    fields = loadmat(tmp_path / "fogml_model.mat", simplify_cells=True)["fogml"]
+    f = np.prod(atoms[:, None, :] ** np.atleast_2d(fields["powers"]), axis=2)
+    np.testing.assert_allclose(f, plan.compose(atoms), rtol=1e-12)
+    assert json.loads(fields["document"]) == {key: held[key] for key in json.loads(fields["document"])}
+
+
+def test_operators_with_numbers_have_them_in_the_file(tmp_path):
+    waves = "late_sine(T_in, 9 degC, 60 s), transition(T_in, 20 degC, 5 degC)"
+    model = make_model("polynomial", features=f"T_in, {waves}, beyond(T_in, 0 degC, 9 degC)")
+    export_model(model.fit(training_run()), tmp_path, ExportSettings("json"))
+    held = json.loads((tmp_path / "fogml_model.json").read_text())
+    given = {atom["operator"]: atom["parameters"] or atom["bounds"] for atom in held["atoms"]}
+    assert given == {
+        "value": None, "late_sine": [9.0, 60.0], "transition": [20.0, 5.0], "beyond": [0.0, 9.0],
+    }  # fmt: skip
+    assert held["operators"]["transition"] == "tanh((x - parameters[0])/parameters[1])"
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32", "int8"])

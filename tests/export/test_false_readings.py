@@ -8,7 +8,7 @@ import pytest
 from fogml.export.c_program import CProgram
 from fogml.export.c_source import c_source
 from fogml.export.check import c_difference
-from fogml.export.false_readings import false_reading_error, false_readings
+from fogml.export.false_readings import false_reading_error, false_reading_lines, false_readings
 from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.plan import Plan
 from fogml.models.compensation import compensate_blocks
@@ -54,6 +54,21 @@ def test_the_stated_error_against_closed_forms():
     told = false_readings(plan)
     assert told["largest_error"][0]["one_deg_h"] == one and abs(told["rate_degC_s"] - 3.0 * RATE) < 1e-9
     assert false_readings(Plan.of(make_model("mean").fit(ramps()))) is None
+
+
+def test_false_readings_of_a_gyro_that_turns_move_its_scale_factor_too(model_of):
+    """By what the thermometer is off times the steepest slope of the scale factor, beside the bias."""
+    plan = Plan.of(model_of("joint"))
+    _, s1, s2 = scale = plan.arrays["scale"]
+    off, output = plan.thermometer.off_degC(plan.sample_s), 36_000.0 / scale[0]
+    low, high = float(plan.limits.box_low[0]), float(plan.limits.box_high[0])
+    steepest = max(abs(s1 + s2 * (2.0 * low + off)), abs(s1 + s2 * (2.0 * high - off)))
+    told = false_readings(plan)["largest_error"][0]
+    more = told["one_turning_deg_h"] - told["one_deg_h"]
+    np.testing.assert_allclose(more, off * steepest * output, rtol=1e-6)
+    assert more > told["one_deg_h"]
+    assert "turning at 10 deg/s" in "\n".join(false_reading_lines(false_readings(plan)))
+    assert "turning" not in "\n".join(false_reading_lines(false_readings(Plan.of(model_of("polynomial")))))
 
 
 def with_offsets(run: Run, seed: int, most: float) -> tuple[Run, np.ndarray]:
