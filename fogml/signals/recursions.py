@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from fogml.arrays import FloatArray
+from fogml.arrays import FloatArray, IndexArray
 from fogml.signals.compiled import kernel
 
 _ROUNDED = 2.0 * float(np.finfo(np.float64).eps)
@@ -170,3 +170,33 @@ def window_steps_kernel(
             step_x[i - first] = x[i] - x[i - 1]
             step_t[i - first] = time[i] - time[i - 1]
     return step_x, step_t
+
+
+@kernel()
+def course_steps_kernel(time: FloatArray, x: FloatArray, rows: IndexArray, window: float) -> FloatArray:
+    """Means over the newest window less those over the one before, of a course linear between samples.
+
+    For the samples of rising numbers `rows`, two windows or more after the first; shape (len(rows),).
+    """
+    n = len(time)
+    # About the first sample, a constant x has means of exactly 0.
+    total = np.zeros(n)
+    for i in range(1, n):
+        total[i] = total[i - 1] + 0.5 * (x[i] + x[i - 1] - 2.0 * x[0]) * (time[i] - time[i - 1])
+    out = np.empty(len(rows))
+    before = np.zeros(2, dtype=np.int64)
+    for k in range(len(rows)):
+        row = rows[k]
+        means = total[row]
+        for back in range(2):
+            at = time[row] - (back + 1.0) * window
+            i = before[back]
+            while i < n - 2 and time[i + 1] <= at:
+                i += 1
+            before[back] = i
+            since, step = at - time[i], time[i + 1] - time[i]
+            slope = (x[i + 1] - x[i]) / step if step > 0.0 else 0.0
+            integral = total[i] + since * (x[i] - x[0] + 0.5 * since * slope)
+            means += -2.0 * integral if back == 0 else integral
+        out[k] = means / window
+    return out

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fogml.arrays import FloatArray, IndexArray
+from fogml.arrays import FloatArray
 
 Kept = TypeVar("Kept")
 _NAN = float("nan")
@@ -76,7 +76,10 @@ class Memory:
             past = time[apart] - all_time[0] >= (2.0 - 1e-8) * window_s
             cut, full = apart[~past], apart[past]
             step_x[cut] *= window_s / np.maximum(step_t[cut], window_s)
-            step_x[full] = _difference_of_course(all_time, all_x, len(known_time) + full, window_s)
+            if len(full):
+                from fogml.signals.recursions import course_steps_kernel
+
+                step_x[full] = course_steps_kernel(all_time, all_x, len(known_time) + full, window_s)
         return step_x
 
     def _steps(
@@ -168,18 +171,3 @@ def _neighbours(time: FloatArray, x: FloatArray, first: int) -> tuple[FloatArray
     before = slice(max(first - 1, 0), -1)
     steps = (x[max(first, 1) :] - x[before], time[max(first, 1) :] - time[before])
     return steps if first else (np.concatenate([[0.0], steps[0]]), np.concatenate([[0.0], steps[1]]))
-
-
-def _difference_of_course(time: FloatArray, x: FloatArray, rows: IndexArray, window_s: float) -> FloatArray:
-    """Differences at `rows` of the means of a course that is linear between samples."""
-    step, x = np.diff(time), x - x[0]
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * step)])
-    slope = np.divide(np.diff(x), step, out=np.zeros(len(step)), where=step > 0.0)
-
-    def integral(at: FloatArray) -> FloatArray:
-        i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(slope) - 1)
-        since = at - time[i]
-        return np.asarray(total[i] + since * (x[i] + 0.5 * since * slope[i]))
-
-    middle, start = (integral(time[rows] - back * window_s) for back in (1.0, 2.0))
-    return np.asarray((total[rows] - 2.0 * middle + start) / window_s)
