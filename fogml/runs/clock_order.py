@@ -24,8 +24,12 @@ TICKS_S = (1e-9, 1e-6, 1e-4, 1e-3)
 """Ticks of counters [s] beside the unit that the column states."""
 FEW_REPEATS = 0.02
 """Share of rows that may show the time of the row before and still be single faults."""
-HOUR_S = 3600.0
-"""What local time is put back by at the end of summer time [s]."""
+_PUT_BACK = (
+    (3600.0, "repaired_hour", "the clock is put back by one hour, as local time is in autumn", "hour"),
+    (86_400.0, "repaired_wrap", "the time of day begins anew", "day"),
+    (604_800.0, "repaired_wrap", "the time of the week begins anew", "week"),
+)
+"""What a clock that tells the time is put back by [s], with the code and words of what is found."""
 MOST_LEGS = 100
 """Restarts from which on a clock is no clock."""
 SHORTEST_LEG = 10
@@ -114,7 +118,7 @@ def in_order(
     if float(np.ptp(time)) == 0.0:
         return Ordered(clock.rows, time, (slice(0, len(time)),), hopeless="it stands still")
     _unwrap(clock, tick_s)
-    _add_hour(clock)
+    _add_back(clock)
     _drop_repeats(clock, columns)
     legs = _legs(clock)
     if legs is None:
@@ -155,23 +159,27 @@ def _unwrap(clock: _Clock, tick_s: float) -> None:
                 return
 
 
-def _add_hour(clock: _Clock) -> None:
-    """Add the hour that local time is put back by in autumn, where rows go on right after it.
-
-    A recording that begins anew begins where its clock did, and is none of it.
-    """
+def _add_back(clock: _Clock) -> None:
+    """Add an hour that autumn puts back, or a day or week that ended; none where a recording begins anew."""
     time = clock.time
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0.0)
-    if len(back) != 1 or not (steps > 0.0).any():
+    if not len(back) or not (steps > 0.0).any():
         return
     near = _NEAR * float(np.median(steps[steps > 0.0]))
-    at = int(back[0])
-    if 0.0 < steps[at] + HOUR_S <= near < HOUR_S and abs(time[at + 1] - time[0]) > near:
-        clock.time = time.copy()
-        clock.time[at + 1 :] += HOUR_S
-        told = "the clock is put back by one hour, as local time is in autumn"
-        clock.note("repaired_hour", told, "adds the hour from there on", "added from there on", at + 1, 1)
+    begins = time[back + 1]
+    for length, code, told, what in _PUT_BACK:
+        # A recording that begins anew begins where its clock did.
+        over = steps[back] + length
+        sound = (over > 0.0) & (over <= near) & (np.abs(begins - time[0]) > near)
+        is_one = len(back) == 1 if what == "hour" else np.all(np.abs(begins) <= near)
+        if is_one and near < length and sound.all():
+            clock.time = time.copy()
+            for i in back.tolist():
+                clock.time[i + 1 :] += length
+            words = f"adds the {what} from there on", "added from there on"
+            clock.note(code, told, *words, int(back[0]) + 1, len(back))
+            return
 
 
 def _drop_repeats(clock: _Clock, columns: Mapping[str, FloatArray]) -> None:

@@ -11,13 +11,15 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, listed, printable, quoted
 from fogml.readers import reader_of
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
-from fogml.runs.other_rate import Beside, clock_s, interpolated, is_held
+from fogml.runs.other_rate import Beside, clock_s, held_beyond, interpolated, is_held
 from fogml.runs.raw_table import RawTable, choose_vectors, moment, stored_blocks, vector_fault
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
@@ -141,6 +143,9 @@ def container_blocks(
         ]
         joined, others_of = _one_of_each(joined)
         findings += [*left_out, *_joined_findings(joined), *others_of, *_fields_left_out(stored)]
+        for cell, group, array in joined:
+            spans = (_clock_ends(path, stored, of) for of in (main, group))
+            findings += held_beyond(parse_header(cell)[0], *spans, max(array.shape))
         started = moment(stored.told.get("origin_s"))
         beside = [Beside(cell, group.column("time"), array) for cell, group, array in joined]
         for table in stored_blocks(stored, vectors, tuple(findings), None, rows, columns):
@@ -231,6 +236,8 @@ def container_columns(
             if array.group != main:
                 at, own = (_clock_of(path, stored, groups[name]) for name in (main, array.group))
                 findings.append(next(_joined_findings([(array.name, groups[array.group], array)])))
+                if source not in held:
+                    findings += held_beyond(array.name, _ends(at), _ends(own), len(own))
                 values = interpolated(at, own, values, source in held)
             columns[source] = values
             if len(values) != count:
@@ -259,6 +266,19 @@ def _source(path: Path, stored: StoredFile, source: str | int) -> StoredArray:
         fault = "no column" if not found else "more than one column"
         raise InputError(f"{path.name}: {fault} {quoted(source)}; it holds {listed(held, 40)}")
     return found[0]
+
+
+def _clock_ends(path: Path, stored: StoredFile, group: Group) -> tuple[float, float]:
+    """First and last time of a group [s]."""
+    cell, array = group.column("time")
+    count = max(array.shape)
+    ends = [stored.read(array, i, i + 1)[0] for i in (0, count - 1)] if count else [np.nan, np.nan]
+    first, last = (float(end) * clock_s(cell, path.name) for end in ends)
+    return first, last
+
+
+def _ends(times: FloatArray) -> tuple[float, float]:
+    return float(np.nanmin(times)), float(np.nanmax(times))
 
 
 def _clock_of(path: Path, stored: StoredFile, group: Group) -> FloatArray:

@@ -19,7 +19,15 @@ from fogml.runs.logger_lines import FaultyFields
 from fogml.runs.logger_text import LoggerTable, read_logger_text
 from fogml.runs.opening import Opened, opened
 from fogml.runs.other_rate import interpolated, is_held
-from fogml.runs.profile_parts import ImportColumn, JoinedLog, LegByState, LegByTime, RowFilter, TextLayout
+from fogml.runs.profile_parts import (
+    ImportColumn,
+    JoinedLog,
+    LegByState,
+    LegByTime,
+    RowFilter,
+    Source,
+    TextLayout,
+)
 from fogml.runs.profile_schema import ImportProfile
 from fogml.runs.stamps import Stamps
 from fogml.signals import large
@@ -72,26 +80,28 @@ def chosen_rows(table: LoggerTable, profile: TextLayout) -> LoggerTable:
             row = int(table.rows[np.argmin(inside)]) + 1
             table = table.kept(inside, Finding("rejected_rows", message, row=row, count=lost))
     for name, column in profile.columns.items():
-        source = column.number
-        if not column.missing or source is None or source not in table.columns:
-            continue
-        values = table.columns[source]
-        none = _is_one_of(values, column.missing)
-        lost = int(np.count_nonzero(none))
-        if lost == 0:
-            continue
-        row = int(table.rows[np.argmax(none)]) + 1
-        if is_temperature(name) and lost < len(none):
-            verb = "stands" if lost == 1 else "stand"
-            message = f"{counted(lost, 'value')} of {quoted(str(source))} {verb} for none: interpolated"
-            table = table.kept(slice(None), Finding("sentinel", message, column=name, row=row, count=lost))
-            table = replace(
-                table, columns={**table.columns, source: _bridged(values, none, _clock(table, profile))}
-            )
-        else:
-            message = f"{counted(lost, 'row')} in which {quoted(str(source))} stands for none left out"
-            table = table.kept(~none, Finding("rejected_rows", message, row=row, count=lost))
+        for source in profile.sources_of(name) if column.missing else ():
+            if source in table.columns:
+                table = _without_none(table, profile, name, source)
     return table
+
+
+def _without_none(table: LoggerTable, profile: TextLayout, name: str, source: Source) -> LoggerTable:
+    """The table without the values of a source that stand for none in a column of the run."""
+    values = table.columns[source]
+    none = _is_one_of(values, profile.columns[name].missing)
+    lost = int(np.count_nonzero(none))
+    if lost == 0:
+        return table
+    row = int(table.rows[np.argmax(none)]) + 1
+    if is_temperature(name) and lost < len(none):
+        verb = "stands" if lost == 1 else "stand"
+        message = f"{counted(lost, 'value')} of {quoted(str(source))} {verb} for none: interpolated"
+        table = table.kept(slice(None), Finding("sentinel", message, column=name, row=row, count=lost))
+        filled = _bridged(values, none, _clock(table, profile))
+        return replace(table, columns={**table.columns, source: filled})
+    message = f"{counted(lost, 'row')} in which {quoted(str(source))} stands for none left out"
+    return table.kept(~none, Finding("rejected_rows", message, row=row, count=lost))
 
 
 def _is_one_of(values: FloatArray, numbers: Sequence[float]) -> BoolArray:

@@ -313,9 +313,10 @@ class _Reader:
             stamps = stamps_of([(i, column[:1000].tolist()) for i, column in enumerate(columns)])
             if stamps is None:
                 first = " ".join(str(text) for column in columns for text in column[:1])
+                named = listed([quoted(str(place)) for place in places])
+                what = "date or time of day" if len(places) == 1 else "date in one, time of day in the other"
                 raise InputError(
-                    f"{self.file}, column {quoted(str(places[0]))}: {quoted(first)} in the first row is no "
-                    f"date or time of day; {self.hint}"
+                    f"{self.file}, column {named}: {quoted(first)} in the first row is no {what}; {self.hint}"
                 )
             self.clock = StampClock(stamps, self.file)
         return self.clock.seconds([pa.array(column, pa.string()) for column in columns])

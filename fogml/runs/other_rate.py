@@ -14,6 +14,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
+from fogml.numerals import duration
 from fogml.runs.columns import DUTY, column_spec, conversion, parse_header
 from fogml.runs.findings import Finding
 from fogml.runs.reader_process import StoredArray, StoredFile
@@ -88,6 +89,7 @@ def on_gyro_rows(
             f"'{name}' is of another rate, {len(held)} values in {len(time)} rows; {how} at its true times"
         )
         findings.append(Finding("other_rate", message, column=name, row=int(held[0]) + 1, count=len(held)))
+        findings += held_beyond(name, _ends(time[rows]), _ends(time[held]), len(held))
     return filled, rows, tuple(findings)
 
 
@@ -102,6 +104,34 @@ def _at(time: FloatArray, known: FloatArray, values: FloatArray, hold: bool) -> 
     apart = known[after] - known[before]
     hole = (apart > LONGEST_HOLE * float(np.median(np.diff(known)))) & (time != known[before])
     return np.where(hole, np.nan, found)
+
+
+def held_beyond(
+    name: str, run_s: tuple[float, float], own_s: tuple[float, float], count: int
+) -> list[Finding]:
+    """What is said of a column whose values are of a part of the run alone: beyond, the nearest is held.
+
+    Parameters
+    ----------
+    name
+        The column.
+    run_s, own_s
+        First and last time of the run, and of the column's own values [s].
+    count
+        How many values it has.
+    """
+    step_s = (own_s[1] - own_s[0]) / max(count - 1, 1)
+    sides = ((own_s[0] - run_s[0], "before its first value"), (run_s[1] - own_s[1], "after its last"))
+    told = [f"{duration(lost)} {side}" for lost, side in sides if lost > LONGEST_HOLE * step_s]
+    # A switch keeps its value.
+    if not told or is_held(name):
+        return []
+    message = f"'{name}' is not known {' and '.join(told)}: the nearest value is held there"
+    return [Finding("held_beyond", message, column=name)]
+
+
+def _ends(times: FloatArray) -> tuple[float, float]:
+    return float(times[0]), float(times[-1])
 
 
 def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray, hold: bool = False) -> FloatArray:

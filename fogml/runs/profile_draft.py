@@ -65,12 +65,8 @@ def draft_profile(path: Path) -> str:
         for one in fields:
             # Without its values another column would be taken for what it is.
             file.within.check_column(one.name, sum(bool(text.strip()) for text in one.first), len(one.first))
-    lines = [
-        "schema: fogml.import/1",
-        f"description: {_quoted('draft for ' + path.name)}",
-        *layout,
-        *_columns(fields),
-    ]
+    lines = ["schema: fogml.import/1", f"description: {_quoted('draft for ' + path.name)}"]
+    lines += [*layout, *_columns(fields)]
     # Names may hold marks that end a line of YAML.
     return "\n".join(map(visible, lines)) + "\n"
 
@@ -238,13 +234,19 @@ def _is_of_a_run(one: _Field) -> bool:
 
 def _clock(left: list[_Field]) -> list[str]:
     """The clock's line: stamps, else a column that only grows and is named as one."""
-    stamped = [f for f in left if f.first and f.first[0].strip() and (stamp_form([f.first[0].strip()]))]
+    stamped = [(f, form.kind) for f in left if f.first and (form := stamp_form([f.first[0].strip()]))]
+    # What stands still is no time of day.
+    stamped.sort(key=lambda one: len(set(one[0].first)) == 1)
     if stamped:
-        for one in stamped:
-            left.remove(one)
-        sources = [_quoted(f.source) for f in stamped[:2]]
-        shown = f"[{', '.join(sources)}]" if len(sources) > 1 else sources[0]
-        return [f"  time: {{source: {shown}, unit: stamp}}"]
+        left[:] = [f for f in left if all(f is not one for one, _ in stamped)]
+        whole = [f for f, kind in stamped if kind.startswith("date and")]
+        parts = [[f for f, kind in stamped if (kind == "date") is is_date][:1] for is_date in (True, False)]
+        used = whole[:1] or [f for part in parts for f in part]
+        shown = [_quoted(f.source) for f in used]
+        others = ", ".join(_quoted(f.source) for f, _ in stamped if f not in used)
+        source = shown[0] if len(shown) == 1 else f"[{', '.join(shown)}]"
+        doubt = f"    {_MARK}or by {others}?" if others else ""
+        return [f"  time: {{source: {source}, unit: stamp}}{doubt}"]
     # Other columns of the run format, such as a T that grows, are no clocks.
     free = [f for f in left if f.name == "time" or column_spec(f.name) is None]
     named = [f for f in free if f.name == "time" or _TIME.search(f.name) or _DATE.search(f.name)]

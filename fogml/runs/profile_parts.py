@@ -137,10 +137,15 @@ class TextLayout(Strict):
     @property
     def sources(self) -> tuple[Source, ...]:
         """The columns of numbers that are read, each once."""
-        wanted = [column.number for column in self.columns.values()]
+        wanted = [source for name in self.columns for source in self.sources_of(name)]
         wanted += [rule.source for rule in self.where if not rule.texts]
         wanted += [self.reject.leading_jump.source] if self.reject.leading_jump else []
-        return tuple(dict.fromkeys(source for source in wanted if source is not None))
+        return tuple(dict.fromkeys(wanted))
+
+    def sources_of(self, name: str) -> tuple[Source, ...]:
+        """The columns of numbers that a column of the run is read from, one of each axis."""
+        number = self.columns[name].number
+        return () if number is None else (number,)
 
     @property
     def text_sources(self) -> tuple[Source, ...]:

@@ -172,7 +172,11 @@ class ImportProfile(TextLayout):
     def sources(self) -> tuple[Source, ...]:
         """The columns of numbers that the profile uses, each once."""
         states = [leg.source for leg in self.legs.values() if isinstance(leg, LegByState) and not leg.texts]
-        return tuple(dict.fromkeys([*super().sources, *self.axes.values(), *states, *self.keep]))
+        return tuple(dict.fromkeys([*super().sources, *states, *self.keep]))
+
+    def sources_of(self, name: str) -> tuple[Source, ...]:
+        """The columns of numbers that a column of the run is read from, one of each axis."""
+        return tuple(self.axes.values()) if name == "gyro" and self.axes else super().sources_of(name)
 
     @property
     def compared_texts(self) -> tuple[Source, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from fogml.runs.logger_rows import (
     rows_of_leg,
 )
 from fogml.runs.logger_text import LoggerTable
+from fogml.runs.other_rate import held_beyond
 from fogml.runs.possible import Rows
 from fogml.runs.profile_parts import LeadingJump
 from fogml.runs.profile_schema import ImportProfile, load_profile, profile_names
@@ -150,7 +152,7 @@ def runs_from_table(
                 raise InputError(f"{file}: no rows are left; {what}")
             findings = [*table.findings, *found]
             runs += runs_of_columns(
-                _columns(table, part, profile, this_axis, file, joined),
+                _columns(table, part, profile, this_axis, file, joined, findings),
                 Rows(file, lambda i, rows=rows: f"data row {int(rows[i]) + 1}"),  # type: ignore[misc]
                 _with_losses(_facts(profile, this_axis, facts, table), findings, len(rows), most_dropped),
                 name,
@@ -160,7 +162,8 @@ def runs_from_table(
                 repair=repair,
                 most_dropped=most_dropped,
             )
-    runs = [_from_zero(run) for run in runs]
+    begun = None if table.stamps is None else table.stamps.started
+    runs = [_from_zero(run, begun) for run in runs]
     return [run.with_findings(check_run(run)) for run in runs]
 
 
@@ -174,10 +177,14 @@ def _tick_s(profile: ImportProfile) -> float:
     )
 
 
-def _from_zero(run: Run) -> Run:
-    """The run with a clock that begins at 0."""
+def _from_zero(run: Run, begun: datetime | None) -> Run:
+    """The run with a clock that begins at 0, where it was at the file's first stamp, `begun`."""
     columns = {**run.columns, "time": large.each(lambda time: time - run.time[:1], run.time)}
-    return Run.derived(run.name, columns, run.facts, run.gyro_unit, run.findings)
+    facts = run.facts
+    if begun is not None and facts.started == begun:
+        started = begun + timedelta(seconds=float(run.time[0]))
+        facts = facts.model_copy(update={"started": started})
+    return Run.derived(run.name, columns, facts, run.gyro_unit, run.findings)
 
 
 def _with_losses(facts: Facts, findings: Sequence[Finding], kept: int, most: float) -> Facts:
@@ -238,7 +245,9 @@ def _columns(
     axis: str | None,
     file: str,
     joined: Sequence[Mapping[str, FloatArray]],
+    findings: list[Finding],
 ) -> dict[str, FloatArray]:
+    """The columns of a run in internal units; what is noticed of joined ones is added to `findings`."""
     columns: dict[str, FloatArray] = {}
     for name, column in profile.columns.items():
         source = profile.axes[axis] if name == "gyro" and axis is not None else column.number
@@ -263,16 +272,18 @@ def _columns(
     for log, held in zip(profile.join, joined):
         at, time = held["time"] - start, columns["time"]
         begin, end = float(np.nanmin(at)), float(np.nanmax(at))
-        if not (begin <= np.nanmax(time) and np.nanmin(time) <= end):
+        first, last = float(np.nanmin(time)), float(np.nanmax(time))
+        if not (begin <= last and first <= end):
             name = log.file.replace("{stem}", plain_path(Path(file)).stem)
             raise InputError(
                 f"{file}: the joined {name} covers {begin:.10g} to {end:.10g} s of the recording's clock, "
-                f"which shows {np.nanmin(time):.10g} to {np.nanmax(time):.10g} s; it needs dates in both, "
+                f"which shows {first:.10g} to {last:.10g} s; it needs dates in both, "
                 "or 'offset_s' in the profile"
             )
         for name in held:
             if name != "time":
                 columns[name] = interpolated(time, at, held[name], is_held(name))
+                findings += held_beyond(name, (first, last), (begin, end), len(at))
     for source in profile.keep:
         columns[parse_header(source)[0]] = large.chosen(table.columns[source], part)
     order = ["time", "gyro", *(name for name in columns if name not in ("time", "gyro"))]
@@ -283,7 +294,7 @@ def _facts(profile: ImportProfile, axis: str | None, overriding: Facts | None, t
     """Facts of the profile, then of the axis, then of the side file; notes are joined."""
     layers = [profile.facts, profile.axis_facts.get(axis or "", Facts()), overriding or Facts()]
     values: dict[str, object] = {"axis": axis}
-    if table.stamps is not None and table.stamps.started is not None and not profile.legs:
+    if table.stamps is not None and table.stamps.started is not None:
         values["started"] = table.stamps.started
     for layer in layers:
         values.update({key: getattr(layer, key) for key in layer.model_fields_set})

@@ -199,7 +199,10 @@ def stamps_of(columns: Sequence[tuple[int, Sequence[str]]]) -> Stamps | None:
 
     forms = [(place, stamp_form(texts)) for place, texts in columns]
     known = tuple((place, form) for place, form in forms if form is not None)
-    if not known or len(known) < len(columns):
+    dates = sum("date" in form.kind for _, form in known)
+    times = sum(form.kind != "date" for _, form in known)
+    # Two of a kind would be added up.
+    if not known or len(known) < len(columns) or max(dates, times) > 1:
         return None
     first = 0
     for (_, form), (_, texts) in zip(known, columns, strict=True):

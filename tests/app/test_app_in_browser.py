@@ -218,3 +218,29 @@ def test_two_hundred_units_are_found_and_chosen(browser: Browser, tmp_path: Path
     wait(page, "(document.getElementById('line').textContent.match(/FOG-/g) || []).length === 200")
     assert not page.console
     app.kill()
+
+
+def test_a_file_that_was_chosen_and_is_removed_is_chosen_no_more(browser: Browser, tmp_path: Path) -> None:
+    """Its mark is gone with its name, so that it could not be taken off."""
+    files = tmp_path / "lab" / "files"
+    files.mkdir(parents=True)
+    for name in ("a.csv", "b.csv", "own.yaml"):
+        (files / name).write_text(csv_text(0, rows=300))
+    app = Running(tmp_path / "lab")
+    page = browser.open_at(app.address)
+    click(page, "[data-command=import]")
+    pick(page, "profile", "files/own.yaml")
+    click(page, "[data-command=inspect]")
+    for name in ("a.csv", "b.csv"):
+        click(page, f'[data-key=runs][data-file="{name}"]')
+    wait(page, "document.getElementById('line').textContent.includes('files/a.csv files/b.csv')")
+    for name in ("a.csv", "own.yaml"):
+        assert app.ask("DELETE", f"/api/files/{name}")[0] == 200
+    wait(
+        page,
+        "document.getElementById('line').textContent === 'fogml inspect files/b.csv --out jobs/NEW/results'",
+    )
+    click(page, "[data-command=import]")
+    wait(page, "!document.getElementById('line').textContent.includes('own.yaml')")
+    assert not page.console
+    app.kill()

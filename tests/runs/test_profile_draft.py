@@ -225,3 +225,25 @@ def test_a_guess_of_the_gyros_unit_goes_by_what_the_cell_says(tmp_path, cell, fa
     assert "GUESS" in profile.read_text()
     (run,) = import_recording(path, profile)
     np.testing.assert_allclose(run.gyro, factor * (np.arange(50) % 7 + 0.25), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "told"),
+    [
+        (
+            "UTC;Local;w",
+            "2026-03-02 07:00:{0:02d};2026-03-02 08:00:{0:02d};{0},5",
+            "source: UTC, unit: stamp",
+        ),
+        ("Date;Stamp;w", "2026-03-02;2026-03-02 08:00:{0:02d};{0},5", "source: Stamp, unit: stamp"),
+        ("Since;Clock;Day;w", "08:00:00;08:00:{0:02d};2026-03-02;{0},5", "source: [Day, Clock]"),
+    ],
+)
+def test_of_several_columns_of_dates_one_is_the_clock(tmp_path, head, row, told):
+    path = tmp_path / "log.csv"
+    path.write_text(head + "\n" + "".join(row.format(i) + "\n" for i in range(COUNT)))
+    draft = draft_profile(path)
+    assert told in draft and "# GUESS: or by " in draft
+    (tmp_path / "p.yaml").write_text(draft)
+    (run,) = import_recording(path, tmp_path / "p.yaml")
+    np.testing.assert_array_equal(run.time, np.arange(COUNT))

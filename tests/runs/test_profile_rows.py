@@ -9,6 +9,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.runs.profiles import import_recording, load_profile
+from fogml.runs.reading import read_run
 from tests.readers import files
 
 COUNT = 40
@@ -210,3 +211,76 @@ def test_faults_of_a_profile(tmp_path, more, told):
     path.write_text(HEAD + COLUMNS + more)
     with pytest.raises(InputError, match=told):
         load_profile(path)
+
+
+def test_values_that_stand_for_none_of_several_gyros(read):
+    profile = (
+        "schema: fogml.import/1\ndescription: a bench\nsample_s: 1\n"
+        "columns:\n  gyro: {unit: deg/h, missing: [-9999]}\naxes: {x: Wx, y: Wy}\n"
+    )
+    x, y = read(profile, "Wx,Wy\n1.5,7.5\n-9999,6.5\n2.5,-9999\n3.5,5.5\n4.5,4.5\n")
+    np.testing.assert_array_equal(x.gyro, [1.5, 3.5, 4.5])
+    np.testing.assert_array_equal(y.gyro, [7.5, 5.5, 4.5])
+    np.testing.assert_array_equal(x.time, [0.0, 3.0, 4.0])
+    assert [f.count for f in x.findings if f.code == "rejected_rows"] == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("more", "rows"),
+    [
+        ("where: [{source: State, equals: up}]\n", [8]),
+        ("legs: {a: {from_s: 1, to_s: 6}, b: {source: State, equals: up}}\n", [2, 8]),
+        ("facts: {started: 2026-03-28T12:00:00}\nwhere: [{source: State, equals: up}]\n", None),
+    ],
+)
+def test_a_run_started_when_its_first_row_did(read, more, rows):
+    runs = read(HEAD + COLUMNS + more, log())
+    stated = [datetime(2026, 3, 28, 12)] if rows is None else [BEGIN + timedelta(seconds=i / 2) for i in rows]
+    assert [run.facts.started for run in runs] == stated
+
+
+def test_two_columns_of_dates_are_not_added_up(read, tmp_path):
+    rows = "".join(f"2026-03-02 0{7 + i // 2}:00:00,2026-03-02 08:00:{i:02d},{i}.5\n" for i in range(4))
+    columns = "columns:\n  time: {source: [UTC, Local], unit: stamp}\n  gyro: {source: Omega, unit: dph}\n"
+    with pytest.raises(InputError, match=r"column 'UTC', 'Local': .* no date in one, time of day in"):
+        read(HEAD + columns, "UTC,Local,Omega\n" + rows)
+
+
+def test_a_joined_log_of_a_part_of_the_recording_is_said(read, tmp_path):
+    """What is held before its first value and after its last looks like a soak."""
+    moments = [BEGIN + timedelta(seconds=s) for s in (5, 6, 7, 8)]
+    rows = "".join(f"{m:%Y-%m-%d %H:%M:%S}\t{300 + i},25\n" for i, m in enumerate(moments))
+    (tmp_path / "log-oven.txt").write_text("When\tOven\n" + rows)
+    (run,) = read(HEAD + COLUMNS + JOIN, log())
+    (told,) = (f.message for f in run.findings if f.code == "held_beyond")
+    assert told.startswith("'T_chamber' is not known 5.00 s before its first value and 11.5 s after its last")
+
+
+def test_a_slower_group_of_a_container_of_a_part_of_the_recording_is_said(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    clock = {"wf_start_time": np.datetime64(files.START_S, "s"), "wf_start_offset": 0.0}
+    fast, slow = ({**clock, "wf_increment": step} for step in (0.25, 2.5))
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        writer.write_segment(
+            [
+                nptdms.ChannelObject("Gyro", "gyro", files.GYRO, properties={"unit_string": "deg/h", **fast}),
+                nptdms.ChannelObject(
+                    "Slow", "T", files.WARM[:40:10], properties={"unit_string": "°C", **slow}
+                ),
+            ]
+        )
+    (tmp_path / "own.yaml").write_text(
+        "schema: fogml.import/1\ndescription: bench\ncolumns:\n  time: {source: Gyro/time, unit: s}\n"
+        "  gyro: {source: gyro, unit: deg/h}\n  T: {source: Slow/T, unit: degC}\n"
+    )
+    runs = [read_run(tmp_path / "log.tdms"), *import_recording(tmp_path / "log.tdms", tmp_path / "own.yaml")]
+    for run in runs:
+        (told,) = (f.message for f in run.findings if f.code == "held_beyond")
+        assert told.startswith("'T' is not known 22.2 s after its last:")
+
+
+def test_a_column_of_another_rate_that_ends_early_is_said(tmp_path):
+    rows = "".join(f"{i},{i % 7},{20 + i / 10 if i % 5 == 0 and i < 50 else ''}\n" for i in range(100))
+    (tmp_path / "run.csv").write_text("time [s],gyro [deg/h],T [degC]\n" + rows)
+    (told,) = (f.message for f in read_run(tmp_path / "run.csv").findings if f.code == "held_beyond")
+    assert told.startswith("'T' is not known 54.0 s after its last:")

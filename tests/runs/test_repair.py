@@ -112,6 +112,23 @@ def test_a_recording_of_an_hour_that_begins_anew_is_two(tmp_path):
     assert len(read_runs(file_of(tmp_path, ".csv", time, np.arange(3600.0)), repair=True)) == 2
 
 
+@pytest.mark.parametrize(
+    "cycle, unit, told", [(86_400, "s", "time of day"), (604_800, "ms", "time of the week")]
+)
+def test_a_time_of_day_or_week_goes_on_where_it_begins_anew(tmp_path, cycle, unit, told):
+    even = 40_000.0 + 200.0 * np.arange(4000)
+    scale = {"s": 1, "ms": 1000}[unit]
+    path = file_of(tmp_path, ".csv", scale * (even % cycle), np.arange(4000.0), unit=unit)
+    with pytest.raises(InputError, match=rf"the {told} begins anew.*--repair adds the \w+ from there on"):
+        read_run(path)
+    run = read_run(path, repair=True)
+    np.testing.assert_allclose(run.time, even, atol=1e-6)
+    assert counts(run) == {"repaired_wrap": int(even[-1] // cycle)}
+    # One that was begun at the beginning of a day, each day, is several.
+    again = file_of(tmp_path, ".csv", np.tile(np.arange(0.0, 86_400.0, 200.0), 2), np.arange(864.0))
+    assert len(read_runs(again, repair=True)) == 2
+
+
 @pytest.mark.parametrize("second", [0.0, 0.037, -300.0])
 def test_a_restarted_clock_makes_legs(tmp_path, second):
     time = np.concatenate([0.1 * np.arange(500) + 400.0, 0.1 * np.arange(700) + 400.0 + second])

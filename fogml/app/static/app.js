@@ -77,6 +77,18 @@ function drawFiles() {
 }
 
 const chosen = (key) => [valuesNow()[key] || []].flat();
+const there = (input) => input.takes === "run" ? state.files.filter((one) => one.run).map((one) => one.path)
+  : [...input.known, ...state.offered[input.takes]];
+
+// What was removed has no mark left to take off.
+function forgetGone() {
+  for (const one of state.forms) {
+    for (const input of one.inputs) {
+      const held = state.values[one.command]?.[input.key];
+      if (held) state.values[one.command][input.key] = [held].flat().filter((path) => there(input).includes(path));
+    }
+  }
+}
 
 function choose(input, path, wanted) {
   const others = input.several ? chosen(input.key).filter((one) => one !== path) : [];
@@ -115,7 +127,7 @@ const NONE = { model: ["none yet: train one first", "choose a model"], models: [
 
 function drawChoices() {
   byId("choices").replaceChildren(...form().inputs.filter((input) => input.takes !== "run").map((input) => {
-    const names = [...input.known, ...state.offered[input.takes]];
+    const names = there(input);
     const none = NONE[input.takes]?.[names.length ? 1 : 0] ?? "as it is";
     const held = chosen(input.key)[0] || "";
     const list = element("select", { "data-key": input.key, onchange: (event) => { valuesNow()[input.key] = event.target.value ? [event.target.value] : []; showLine(); } },
@@ -220,7 +232,7 @@ async function refresh(first = false) {
     Object.assign(state, told);
     byId("place").textContent = `${told.folder} · fogml ${told.version}`;
     if (first) drawForm();
-    else if (files) { drawChoices(); drawFiles(); showLine(); }
+    else if (files) { forgetGone(); drawChoices(); drawFiles(); showLine(); }
     drawJobs();
     for (const job of state.jobs) {
       if (state.open.has(job.name) && (!state.shown[job.name] || ended.includes(job.name) || job.state === "running")) await look(job.name);
