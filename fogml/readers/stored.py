@@ -130,6 +130,7 @@ class Mat:
         """Group, name, unit and array of each column, of the structs within a struct too."""
         own = held.get("units")
         units = own if isinstance(own, dict) else {}
+        held = apart(held)
         names = [name for name in held if name not in _RESERVED]
         plain = [name for name in names if not isinstance(held[name], dict)]
         yield [
@@ -202,6 +203,19 @@ class PutAway:
 
     def __getitem__(self, part: Any) -> np.ndarray[Any, Any]:
         return np.array(np.memmap(self.file, self.dtype, "r", shape=self.shape, order=self.order)[part])
+
+
+def apart(held: Mapping[str, Any]) -> dict[str, Any]:
+    """The members of a struct; of an array of structs each under its place, as MATLAB counts."""
+    found: dict[str, Any] = {}
+    for name, value in held.items():
+        is_array = isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object)
+        items = list(np.ravel(np.asarray(value, dtype=object))) if is_array else []
+        if items and all(isinstance(item, dict) for item in items[:MOST_NAMES]):
+            found |= {f"{name}({i})": item for i, item in enumerate(items[:MOST_NAMES], start=1)}
+        else:
+            found[name] = value
+    return found
 
 
 def put_away(value: Any) -> Any:

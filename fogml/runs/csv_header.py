@@ -162,6 +162,13 @@ def fields_of(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator), [])
 
 
+def with_cells_above(fields: list[str], above: Sequence[str]) -> list[str]:
+    """The fields of a line; where one has no text, that above, as of cells merged over two rows."""
+    if len(above) != len(fields) or sum(bool(cell.strip()) for cell in above) < _LEAST_MERGED:
+        return fields
+    return [field if field.strip() else upper for field, upper in zip(fields, above, strict=True)]
+
+
 def is_number_like(field: str) -> bool:
     """Whether a field is a number with any marks, or a date or a time of day."""
     return bool(_NUMBER_LIKE.match(field)) or stamp_form([field]) is not None
@@ -182,9 +189,7 @@ def _header(lines: Sequence[str], i: int, separator: str | None) -> Header:
 def _merged(lines: Sequence[str], i: int, fields: list[str], separator: str) -> list[str]:
     """The fields of a line; where one has no text, that above, as of cells merged over two rows."""
     above = fields_of(uncommented(lines[i - 1]), separator) if i and not all(map(str.strip, fields)) else []
-    if len(above) != len(fields) or sum(bool(cell.strip()) for cell in above) < _LEAST_MERGED:
-        return fields
-    return [field if field.strip() else upper for field, upper in zip(fields, above, strict=True)]
+    return with_cells_above(fields, above)
 
 
 def _separator(header: str, below: Sequence[str]) -> str:

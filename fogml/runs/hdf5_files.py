@@ -29,9 +29,10 @@ from typing import Any, Literal
 import numpy as np
 
 from fogml.errors import InputError, install_words, listed, quoted
-from fogml.runs.columns import parse_header
+from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.container_files import Group, grouped, unknown_fields
 from fogml.runs.facts import Facts, facts_from
+from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.raw_table import (
     FACTS_KEY,
@@ -131,14 +132,19 @@ def mat_blocks(
             raise InputError(f"{path.name}: 'units' must be a struct of texts, e.g. units.time = 's'")
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no numeric vectors; time, gyro and others were expected")
-        vectors, findings = choose_vectors(path.name, _chosen(path, stored, units))
+        chosen, others = _chosen(path, stored, units)
+        vectors, findings = choose_vectors(path.name, chosen.columns)
+        findings += others
         source = f"{path.name}, facts"
         facts = facts_from_json(stated, source) if isinstance(stated, str) else facts_from(stated, source)
         yield from stored_blocks(stored, vectors, findings, None if stated is None else facts, rows, columns)
 
 
-def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> list[tuple[str, StoredArray]]:
-    """The variables at the top, or those of the only struct that holds a time and a gyro."""
+def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> tuple[Group, tuple[Finding, ...]]:
+    """The variables at the top, or those of the only struct that holds a time and a gyro.
+
+    What others hold of a run is said: whether their clocks go with that one nobody can tell.
+    """
     groups = [
         Group(
             name,
@@ -152,11 +158,18 @@ def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> list[tu
     if len(runs) > 1:
         names = listed([group.name for group in runs])
         raise InputError(
-            f"{path.name}: {names} each hold a time and a gyro; save the one that is meant as its own file"
+            f"{path.name}: {names} each hold a time and a gyro; save the one that is meant as its own file, "
+            "or read it by an import profile"
         )
     if not runs and len(groups) > 1:
         raise unknown_fields(path, "mat", groups)
-    return list((runs or groups)[0].columns)
+    chosen = (runs or groups)[0]
+    held = [(group.name, name) for group in groups for name in group.names if group is not chosen]
+    unread = [f"{of}/{name}" if of else name for of, name in held if name != "time" and column_spec(name)]
+    if not unread:
+        return chosen, ()
+    told = f"not read, as of other structs: {listed(map(quoted, unread))}; an import profile reads them"
+    return chosen, (Finding("other_columns", told, count=len(unread)),)
 
 
 def _cell(name: str, unit: str | None) -> str:

@@ -232,18 +232,21 @@ def field_numbers(content: bytes, profile: TextLayout, fields: int, positions: l
     except pa.ArrowInvalid:
         # Some field is no plain number: read text, and let what is none become NaN.
         text = _fields(content, profile, fields, positions, pa.string(), [""])
-        numbers = [_numbers(text[name], profile.decimal) for name in text.column_names]
+        numbers = [_numbers(text[name], profile) for name in text.column_names]
         columns = pa.table(numbers, names=text.column_names)
     return np.stack([values_of(columns[name]) for name in wanted])
 
 
-def _numbers(text: Any, decimal: str) -> Any:
+def _numbers(text: Any, profile: TextLayout) -> Any:
     """Text as float64, null where it is no number."""
     import pyarrow as pa
     import pyarrow.compute as compute
 
     plain = compute.replace_substring_regex(compute.utf8_trim_whitespace(text), r'^"(.*)"$', r"\1")
-    plain = compute.utf8_trim_whitespace(plain)
+    plain = compute.replace_substring(compute.utf8_trim_whitespace(plain), "\u2212", "-")
+    decimal = profile.decimal
+    if profile.text_separator == decimal:
+        plain = compute.replace_substring(plain, HIDDEN, decimal)
     # The decimal mark is stated, so that another one before three digits is one of thousands.
     marks = f"[{'.' if decimal == ',' else ','}'{HIDDEN}\u00a0\u202f]"
     groups = rf"^[-+]?[1-9]\d{{0,2}}({marks}\d{{3}})+({re.escape(decimal)}\d*)?$"

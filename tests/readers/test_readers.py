@@ -17,6 +17,7 @@ from fogml.errors import InputError
 from fogml.readers import READERS, reader_of
 from fogml.runs import raw_table, reader_process
 from fogml.runs.opening import file_format
+from fogml.runs.profile_draft import draft_profile
 from fogml.runs.profiles import import_recording
 from fogml.runs.reading import read_blocks, read_run, read_table
 from fogml.runs.reading_limits import DEFAULT_LIMITS
@@ -179,6 +180,23 @@ def test_wide_messages_are_cut_aloud_and_read_by_name(tmp_path):
     )
     (last,) = import_recording(path, profile)
     np.testing.assert_allclose(last.gyro, GYRO)
+
+
+def test_of_several_structs_of_a_matlab_file_it_is_said_what_is_not_read(tmp_path):
+    own = {"time": files.TIME, "gyro": files.GYRO, "units": {"time": "s", "gyro": "deg/h"}}
+    oven = {"time": files.TIME[::10], "T": files.WARM[::10], "units": {"time": "s", "T": "degC"}}
+    savemat(tmp_path / "log.mat", {"log": {"imu": own, "oven": oven}})
+    (told,) = (f for f in read_run(tmp_path / "log.mat").findings if f.code == "other_columns")
+    assert "'log.oven/T'" in told.message
+    # An array of structs is each of them by its place.
+    runs = np.zeros((1, 2), dtype=[(name, object) for name in own])
+    runs[0, :] = [tuple(own.values())] * 2
+    savemat(tmp_path / "log.mat", {"runs": runs})
+    with pytest.raises(InputError, match=r"runs\(1\), runs\(2\) each hold a time and a gyro; save the one"):
+        read_run(tmp_path / "log.mat")
+    (tmp_path / "p.yaml").write_text(draft_profile(tmp_path / "log.mat"))
+    (run,) = import_recording(tmp_path / "log.mat", tmp_path / "p.yaml")
+    np.testing.assert_array_equal(run.gyro, files.GYRO)
 
 
 def test_the_struct_of_a_matlab_file_and_the_group_of_an_hdf5_file(tmp_path):

@@ -247,3 +247,78 @@ def test_of_several_columns_of_dates_one_is_the_clock(tmp_path, head, row, told)
     (tmp_path / "p.yaml").write_text(draft)
     (run,) = import_recording(path, tmp_path / "p.yaml")
     np.testing.assert_array_equal(run.time, np.arange(COUNT))
+
+
+VALUES = 9.5 + np.arange(COUNT) % 7 / 8
+ODD = {
+    "a header that names two alike": (
+        "time [s],gyro [deg/h],T [degC],T [degC]\n"
+        + "".join(f"{i},{g},20,{30 + i}\n" for i, g in enumerate(VALUES)),
+        "header: false",
+    ),
+    "cells merged over two rows": (
+        "Bench 4,,,\ntime [s],Kreisel,,T [degC]\n,gyro [deg/h],Status,\n"
+        + "".join(f"{i},{g},ok,{20 + i}\n" for i, g in enumerate(VALUES)),
+        "source: 3, unit: degC",
+    ),
+    "means below": (
+        "time [s],gyro [deg/h],T [degC]\n"
+        + "".join(f"{i},{g},{20 + i}\n" for i, g in enumerate(VALUES))
+        + "Mean,9.8,50\n,0.2,17\n",
+        "the lines below the data: left out",
+    ),
+    "days in a column of times": (
+        "Time;gyro [deg/h];T [degC]\n"
+        + "".join(f"{46083.25 + i / 86400:.9f};{g};{20 + i}\n" for i, g in enumerate(VALUES)),
+        "unit: d}",
+    ),
+    "days since year 0": (
+        "Date/Time;gyro [deg/h];T [degC]\n"
+        + "".join(f"{740043.25 + i / 86400:.9f};{g};{20 + i}\n" for i, g in enumerate(VALUES)),
+        "unit: d}",
+    ),
+    "a clock named as a sensor might be": (
+        "TOW [s],gyro [deg/h],T [degC]\n"
+        + "".join(f"{(604790 + i) % 604800},{g},{20 + i}\n" for i, g in enumerate(VALUES)),
+        'time: {source: "TOW [s]", unit: s}',
+    ),
+    "decimal commas between commas": (
+        '"time [s]","gyro [deg/h]","T [degC]"\n'
+        + "".join(f'"{i},0","{g:.3f}","{20 + i},5"\n'.replace(".", ",") for i, g in enumerate(VALUES)),
+        'decimal: ","',
+    ),
+    "another minus": (
+        "time [s],gyro [deg/h],T [degC]\n"
+        + "".join(f"{i},{g},\u2212{20 + i}\n" for i, g in enumerate(VALUES)),
+        "gyro: {source:",
+    ),
+    "a number beside the header": (
+        "time [s],gyro [deg/h],T [degC],,9.75\n"
+        + "".join(f"{i},{g},{20 + i},,\n" for i, g in enumerate(VALUES)),
+        'gyro: {source: "gyro [deg/h]", unit: deg/h}',
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_tables_of_spreadsheets(tmp_path, name):
+    text, told = ODD[name]
+    path, profile = tmp_path / "log.csv", tmp_path / "p.yaml"
+    path.write_text(text, encoding="utf-8")
+    profile.write_text(draft_profile(path), encoding="utf-8")
+    assert told in profile.read_text(encoding="utf-8")
+    (run,) = import_recording(path, profile, repair="TOW" in text)
+    np.testing.assert_allclose(run.gyro, VALUES, rtol=1e-12)
+    np.testing.assert_allclose(run.time, np.arange(COUNT), atol=1e-4)
+
+
+def test_a_gyro_of_no_numbers_is_no_other_column(tmp_path):
+    path, profile = tmp_path / "log.csv", tmp_path / "p.yaml"
+    path.write_text(
+        "Time;gyro [deg/h];T [degC];V\n"
+        + "".join(f"2. Mai 2026 08:{i};({i});{20 + i};5\n" for i in range(COUNT))
+    )
+    profile.write_text(draft_profile(path))
+    assert "'2. Mai 2026 08:0' is no date that is read" in profile.read_text()
+    with pytest.raises(InputError, match=r"column 'gyro \[deg/h\]': '\(0\)' is no number"):
+        import_recording(path, profile)

@@ -37,6 +37,7 @@ UNITS = [
     ("time [min]", 2.5, "time", 150.0),
     ("time [h]", 2.5, "time", 9000.0),
     ("time [sec]", 2.5, "time", 2.5),
+    ("time [d]", 0.5, "time", 43_200.0),
     ("gyro [deg/s]", 0.01, "gyro", 36.0),
     ("gyro [°/h]", 0.5, "gyro", 0.5),
     ("gyro [°/s]", 0.5, "gyro", 1800.0),

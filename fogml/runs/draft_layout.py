@@ -1,0 +1,186 @@
+"""How a text file is written that nobody has described, as the keys of an import profile, and its fields."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.columns import parse_header
+from fogml.runs.csv_dialect import decoded_head
+from fogml.runs.csv_header import fields_of, is_number_like, labview_header, with_cells_above
+from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
+from fogml.runs.header_spelling import canonical_cells, with_units_below
+from fogml.runs.profile_parts import SEPARATORS
+from fogml.yaml_text import parse_yaml
+
+MOST_ROWS = 200
+_TAIL_BYTES = 1 << 12
+
+
+@dataclass
+class Field:
+    """A field of the file: how a profile names it, its name and unit, and its first values as text."""
+
+    source: str | int
+    name: str
+    unit: str | None
+    first: list[str] = field(default_factory=list)
+    marks: Marks = PLAIN
+
+    @property
+    def numbers(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        """The first values, NaN where they are no numbers."""
+        found = (number(t.strip(' "'), self.marks.decimal, self.marks.grouped) for t in self.first)
+        return np.array([np.nan if value is None else value for value in found])
+
+
+def text_layout(path: Path) -> tuple[list[str], list[Field]]:
+    """The layout's keys and the fields of a text file."""
+    head, encoding = decoded_head(path)
+    name, lines, data = _table_of(head)
+    mark = SEPARATORS[name]
+    if data is None:
+        raise InputError(f"{path.name}: no rows of numbers in its first lines; a draft needs some")
+    rows = [_split(line, mark) for line in lines[data : data + MOST_ROWS] if line.strip()]
+    width = len(rows[0])
+    marks = marks_of(CsvSource(path), rows, mark or " ")
+    layout = [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
+    if encoding not in ("utf-8-sig", "utf-8"):
+        layout.append(f"encoding: {encoding}")
+    header = _Header.above(lines, data, width, mark)
+    if header is None or header.is_by_place:
+        # A name would be of none of its columns, or of several.
+        cells = [f"column {i}" for i in range(width)] if header is None else header.known
+        layout += [f"skip_lines: {data}"] if data else []
+        layout += ["header: false", f"fields: {width}"]
+        fields = [Field(i, *parse_header(cell)) for i, cell in enumerate(cells)]
+        if header is not None:
+            layout.append(f"# Fields: {', '.join(f'{f.source} {f.name}' for f in fields)}")
+    else:
+        if next(i for i, text in enumerate(lines) if text.strip()) < header.line:
+            told = as_yaml(lines[header.line].strip()[:60])
+            layout.append(f"header_text: {told}    # the header is the first line that holds this")
+        fields = [Field(cell.strip(' "'), *parse_header(right)) for cell, right in header.cells]
+    below = _are_below(path, encoding, mark, rows)
+    with_units = header is not None and header.with_units and not header.is_by_place
+    if with_units or below:
+        keys = ["not_numbers: true", *(["wrong_field_count: true"] if below else [])]
+        what = ["the row of units below the header"] * with_units + ["the lines below the data"] * below
+        layout.append(f"reject: {{{', '.join(keys)}}}    # {' and '.join(what)}: left out")
+    for place, one in enumerate(fields):
+        one.first, one.marks = [row[place] for row in rows if len(row) == width], marks
+    return layout, fields
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The names above the data.
+
+    Attributes
+    ----------
+    line
+        Its index among the lines.
+    cells
+        Names as they stand, each with its header cell as the run format spells it.
+    with_units
+        Whether the row below holds the units.
+    is_by_place
+        Whether the names tell no columns apart.
+    """
+
+    line: int
+    cells: list[tuple[str, str]]
+    with_units: bool = False
+    is_by_place: bool = False
+
+    @property
+    def known(self) -> list[str]:
+        """The header cells as the run format spells them."""
+        return [right for _, right in self.cells]
+
+    @classmethod
+    def above(cls, lines: Sequence[str], data: int, width: int, mark: str | None) -> _Header | None:
+        """That of the lines above the first one of data; None where they hold none."""
+        if labview := labview_header(lines):
+            spelled = canonical_cells(labview.cells)
+            return cls(labview.line, list(zip(labview.cells, spelled)), is_by_place=True)
+        split = [(i, _split(lines[i], mark)) for i in range(data) if lines[i].strip()]
+        names = [(i, cells) for i, cells in split if len(cells) == width and _are_names(cells)]
+        if not names:
+            return None
+        line, own = names[-1]
+        if len(names) > 1 and (units := with_units_below([c.strip() for c in names[-2][1]], own)):
+            (line, own), known = names[-2], units
+            return cls(line, list(zip(own, known)), with_units=True)
+        cells = [c.strip().strip('"') for c in with_cells_above(own, names[-2][1] if len(names) > 1 else [])]
+        times = Counter(cell for cell in cells if cell)
+        is_by_place = max(times.values(), default=0) > 1 or any(
+            cell != raw.strip().strip('"') for cell, raw in zip(cells, own)
+        )
+        return cls(line, list(zip(own, canonical_cells(cells))), is_by_place=is_by_place)
+
+
+def _are_names(cells: Sequence[str]) -> bool:
+    """Whether the cells of a line are names, a few numbers beside them apart."""
+    numbers = sum(is_number_like(cell.strip(' "')) for cell in cells)
+    return 2 * numbers < sum(bool(cell.strip()) for cell in cells)
+
+
+def _are_below(path: Path, encoding: str, mark: str | None, rows: Sequence[Sequence[str]]) -> bool:
+    """Whether lines other than of numbers stand below them, or such as lack one that every row has."""
+    wide = encoding if encoding.startswith("utf-16") else None
+    tail = CsvSource(path, wide).tail(_TAIL_BYTES).decode(errors="replace").rstrip("\0")
+    lines = [_split(line, mark) for line in re.split(r"\r\n|\r|\n", tail)[1:] if line.strip()]
+    width = len(rows[0])
+    # Of a short file the last of them are those that stand below.
+    full = [row for row in rows[: len(rows) // 2 + 1] if _is_data(row, width)]
+    held = [i for i in range(width) if all(is_number_like(row[i].strip(' "')) for row in full)]
+    return any(len(f) != width or not all(is_number_like(f[i].strip(' "')) for i in held) for f in lines)
+
+
+def _table_of(text: str) -> tuple[str, list[str], int | None]:
+    """The separator's name, the lines, and the first line of numbers."""
+    lines = re.split(r"\r\n|\r|\n", text)[:-1] or [text]
+    best: tuple[float, str, int | None] = (0.0, "comma", None)
+    for name, mark in SEPARATORS.items():
+        rows = [_split(line, mark) for line in lines[-MOST_ROWS:] if line.strip()]
+        counts = [len(row) for row in rows]
+        width = max(set(counts), key=counts.count) if counts else 0
+        first = _first_of_longest([not t.strip() or _is_data(_split(t, mark), width) for t in lines], lines)
+        numbers = [sum(is_number_like(f.strip(' "')) for f in row) for row in rows]
+        score = float(np.median(numbers)) if numbers else 0.0
+        if first is not None and score > best[0]:
+            best = (score, name, first)
+    return best[1], lines, best[2]
+
+
+def _first_of_longest(is_data: Sequence[bool], lines: Sequence[str]) -> int | None:
+    """Where the longest stretch of lines of numbers begins, blank ones apart; None where there is none."""
+    ends = [-1, *(i for i, data in enumerate(is_data) if not data), len(lines)]
+    stretches = [range(a + 1, b) for a, b in pairwise(ends)]
+    return next((i for i in max(stretches, key=len) if lines[i].strip()), None)
+
+
+def _is_data(fields: Sequence[str], width: int) -> bool:
+    return len(fields) == width and 2 * sum(is_number_like(f.strip(' "')) for f in fields) >= width
+
+
+def _split(line: str, mark: str | None) -> list[str]:
+    return line.split() if mark is None else fields_of(line, mark)
+
+
+def as_yaml(value: str | int) -> str:
+    """A value for YAML."""
+    if isinstance(value, int):
+        return str(value)
+    # Words such as 'no' and 'on' are truth values there.
+    is_plain = re.fullmatch(r"[A-Za-z_][\w./]*", value) and parse_yaml(value, value) == value
+    return value if is_plain else json.dumps(value, ensure_ascii=False)
