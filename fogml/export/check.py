@@ -57,6 +57,11 @@ class Difference:
     flags: int = 0
     scale_ppm: float | None = None
 
+    def with_points(self, points: Difference) -> Difference:
+        """That of a history, with that at points."""
+        inside, outside = max(self.inside, points.inside), max(self.outside, points.outside)
+        return replace(self, inside=inside, outside=outside, points=points.points)
+
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
         values: dict[str, Any] = {

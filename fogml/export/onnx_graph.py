@@ -10,11 +10,13 @@ import numpy as np
 from fogml import __version__
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, first_line, install_words
+from fogml.export.onnx_nodes import Graph
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored
 from fogml.features.atoms import DEAD_BAND, Atom, evaluate
 from fogml.features.slices import Slices
 from fogml.runs.columns import is_temperature
+from fogml.runs.dropouts import RULE
 from fogml.runs.run import Run
 
 if TYPE_CHECKING:
@@ -24,7 +26,8 @@ if TYPE_CHECKING:
 OPSET, IR_VERSION = 17, 8
 ONNX_FILE = "fogml_model.onnx"
 BEYOND = {
-    True: "levelled off, and flagged by the output 'flag'",
+    True: "levelled off, and flagged by the output 'flag', as is a window with what is no reading, beyond "
+    f"{RULE.low_degC:g} to {RULE.high_degC:g} degC or no number, whose drift is NaN",
     False: "neither levelled off nor flagged: limit the features to the trained box first, as fogml's "
     "Features.limit does, or export --with-pipeline or --to c",
 }
@@ -40,7 +43,8 @@ def onnx_model(
     Inputs are ``features`` (n, k), limited as `Features.limit` does, or with `pipeline`
     ``temperatures`` (n, m, s): n windows of the last m samples of s temperatures, newest last; a
     joint model takes ``gyro`` (n) [deg/h] besides. The output is ``drift`` (n) [deg/h]; with `pipeline`,
-    which levels off beyond the trained box itself, ``flag`` (n) too: 1 outside the box, else 0.
+    which levels off beyond the trained box itself, ``flag`` (n) too: 1 outside the box, else 0. Of
+    a window with what is no reading of a thermometer, NaN too, the drift is NaN and the flag 1.
 
     Raises
     ------
@@ -61,16 +65,19 @@ def onnx_model(
             "output 'drift' can't hold; export it --to c"
         )
     kind = TensorProto.DOUBLE if dtype == "float64" else TensorProto.FLOAT
-    graph = _Graph(kind)
+    graph = Graph(kind)
     inputs = []
     if pipeline:
         weights = window_weights(plan)
         inputs.append(helper.make_tensor_value_info("temperatures", kind, ["n", *weights.shape[:2]]))
-        columns, outside = _columns_of_window(graph, plan, weights)
+        columns, outside, none = _columns_of_window(graph, plan, weights)
     else:
         inputs.append(helper.make_tensor_value_info("features", kind, ["n", len(plan.names)]))
         columns = "features"
     drift = _value(graph, plan, stored, columns)
+    if pipeline:
+        drift = graph.add("Where", [graph.add("Cast", [none], to=9), graph.constant(np.nan), drift])
+        outside = graph.add("Max", [outside, none])
     if plan.gives_rate:
         inputs.append(helper.make_tensor_value_info("gyro", kind, ["n"]))
     graph.add("Identity", [drift], "drift")
@@ -172,62 +179,15 @@ def window_weights(plan: Plan) -> FloatArray:
     return weights
 
 
-class _Graph:
-    """Nodes and constants under way."""
-
-    def __init__(self, kind: int) -> None:
-        self.kind = kind
-        self.real = np.dtype(np.float64 if kind == 11 else np.float32)
-        self.nodes: list[Any] = []
-        self.constants: list[Any] = []
-
-    def add(self, operator: str, inputs: list[str], name: str = "", **attributes: Any) -> str:
-        """A node; its output's name."""
-        from onnx import helper
-
-        name = name or f"v{len(self.nodes)}"
-        self.nodes.append(helper.make_node(operator, inputs, [name], **attributes))
-        return name
-
-    def constant(self, values: Any, dtype: Any = None) -> str:
-        """A constant in the graph's own precision, or another type; its name."""
-        from onnx import numpy_helper
-
-        name = f"c{len(self.constants)}"
-        array = np.ascontiguousarray(np.asarray(values, dtype=dtype or self.real))
-        self.constants.append(numpy_helper.from_array(array, name))
-        return name
-
-    def whole(self, values: Any) -> str:
-        """A constant of integers."""
-        return self.constant(values, np.int64)
-
-    def stored(self, array: Stored) -> str:
-        """A constant in the small format, and what brings it to the graph's precision."""
-        if array.values.dtype == self.real and array.exponent is None:
-            return self.constant(array.values)
-        name = self.add("Cast", [self.constant(array.values, array.values.dtype)], to=self.kind)
-        if array.exponent is None:
-            return name
-        return self.add("Mul", [name, self.constant(np.ldexp(1.0, array.exponent.astype(np.int32)))])
-
-    def sum(self, value: str, axis: int) -> str:
-        return self.add("ReduceSum", [value, self.whole([axis])], keepdims=0)
-
-    def gather(self, value: str, places: Any) -> str:
-        return self.add("Gather", [value, self.whole(list(places))], axis=1)
-
-    def outside(self, values: str, low: str, high: str) -> str:
-        """Whether any of a row's values (n, a) lies beyond its bounds, int64 (n)."""
-        past = self.add("Or", [self.add("Less", [values, low]), self.add("Greater", [values, high])])
-        whole = self.add("Cast", [past], to=7)  # TensorProto.INT64, as not every type can be the greatest
-        return self.add("ReduceMax", [whole], axes=[1], keepdims=0)
-
-
-def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> tuple[str, str]:
-    """Feature columns (n, k), and whether a window's end lies outside the trained box, int64 (n)."""
+def _columns_of_window(graph: Graph, plan: Plan, weights: FloatArray) -> tuple[str, str, str]:
+    """Feature columns (n, k); whether a window's end lies outside the trained box, and whether it holds what
+    is no reading, int64 (n) each."""
     flat = graph.add("Reshape", ["temperatures", graph.whole([-1, weights.shape[0] * weights.shape[1]])])
-    atoms = graph.add("MatMul", [flat, graph.constant(weights.reshape(-1, weights.shape[2]))])
+    none = graph.beside(flat, plan.thermometer.low_degC, plan.thermometer.high_degC)
+    rows = graph.add("Cast", [graph.add("Unsqueeze", [none, graph.whole([1])])], to=9)  # TensorProto.BOOL
+    values = graph.add("MatMul", [flat, graph.constant(weights.reshape(-1, weights.shape[2]))])
+    # NaN has no place among slices, and would end a whole batch.
+    atoms = graph.add("Where", [rows, graph.constant(0.0), values])
     signs = np.array([atom.operator == "sign" for atom in plan.atoms])
     if signs.any():
         band = graph.constant(DEAD_BAND * (1.0 + 1e-9))
@@ -254,10 +214,10 @@ def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> tuple[
         for factor in factors:
             value = graph.add("Mul", [value, factor])
         columns.append(value)
-    return graph.add("Concat", columns, axis=1), outside
+    return graph.add("Concat", columns, axis=1), outside, none
 
 
-def _beyond_slice(graph: _Graph, slices: Slices, atoms: str) -> str:
+def _beyond_slice(graph: Graph, slices: Slices, atoms: str) -> str:
     """Whether an input of atoms (n, a) lies beyond its trained range at this temperature, int64 (n)."""
     level = graph.add("Sub", [graph.gather(atoms, [slices.level]), graph.constant(slices.first)])
     share = graph.add("Div", [level, graph.constant(slices.width)])
@@ -276,7 +236,7 @@ def _beyond_slice(graph: _Graph, slices: Slices, atoms: str) -> str:
     return graph.outside(value, low, high)
 
 
-def _value(graph: _Graph, plan: Plan, stored: Mapping[str, Stored], columns: str) -> str:
+def _value(graph: Graph, plan: Plan, stored: Mapping[str, Stored], columns: str) -> str:
     """Drift (n) of feature columns (n, k)."""
     constant = graph.stored(stored["constant"])
     linear = graph.sum(graph.add("Mul", [columns, graph.stored(stored["linear"])]), 1)
@@ -308,7 +268,7 @@ def _value(graph: _Graph, plan: Plan, stored: Mapping[str, Stored], columns: str
     return graph.add("Add", [value, graph.sum(weighted, 1)])
 
 
-def _drawn_in(graph: _Graph, plan: Plan, columns: str) -> str:
+def _drawn_in(graph: Graph, plan: Plan, columns: str) -> str:
     """Columns with all rates scaled down together into their trained range."""
     if not plan.edge_columns:
         return columns

@@ -183,6 +183,35 @@ def test_onnx(model_of, tmp_path, name, pipeline, dtype):
     np.testing.assert_allclose(drift, model.predict(run)[ends], atol=bound)
 
 
+@pytest.mark.parametrize("name", ["polynomial", "rich"])
+@pytest.mark.parametrize("none", [np.nan, np.inf, -127.0, 1e30])
+def test_a_window_with_what_is_no_reading_is_flagged_and_ends_no_batch(model_of, tmp_path, name, none):
+    pytest.importorskip("onnx")
+    runtime = pytest.importorskip("onnxruntime")
+    export_model(model_of(name), tmp_path, ExportSettings("onnx", "float32", pipeline=True))
+    session = runtime.InferenceSession(str(tmp_path / "fogml_model.onnx"), providers=["CPUExecutionProvider"])
+    _, length, sensors = session.get_inputs()[0].shape
+    windows = np.full((5, length, sensors), 20.0, dtype=np.float32)
+    sound, good = session.run(None, {"temperatures": windows})
+    windows[1, -1, 0] = windows[3, length // 2, -1] = none
+    drift, flag = session.run(None, {"temperatures": windows})
+    assert np.isnan(drift[[1, 3]]).all() and flag[[1, 3]].tolist() == [1, 1]
+    np.testing.assert_array_equal(drift[[0, 2, 4]], sound[[0, 2, 4]])
+    np.testing.assert_array_equal(flag[[0, 2, 4]], good[[0, 2, 4]])
+
+
+def test_a_graph_from_windows_states_what_its_weights_lose_anywhere_in_the_box(model_of, tmp_path):
+    pytest.importorskip("onnxruntime")
+    stated = [
+        export_model(
+            model_of("rbf"), tmp_path, ExportSettings("onnx", "int8", tolerance=1.0, pipeline=pipeline)
+        )
+        for pipeline in (False, True)
+    ]
+    assert stated[1]["largest_difference"] > 0.999 * stated[0]["largest_difference"]
+    assert stated[1]["compared"]["points"] == stated[0]["compared"]["points"]
+
+
 @needs_cc
 @pytest.mark.parametrize("name", ["rbf", "rich"])
 @pytest.mark.parametrize("train", [False, True])
