@@ -49,6 +49,7 @@ def solve(c: FloatArray, weights: FloatArray, angles_deg: Sequence[float]) -> tu
         If the turns of the states do not tell both components.
     """
     parts = pairs_of(angles_deg)
+    unit, c, weights = _of_size_1(c, weights)
     found, jacobian, _ = _fitted(c, weights, angles_deg, parts)
     axis, errors = found[:3], found[3:]
     k = float(np.linalg.norm(axis))
@@ -65,7 +66,14 @@ def solve(c: FloatArray, weights: FloatArray, angles_deg: Sequence[float]) -> tu
     outer[1:] = np.degrees(outer[1:])
     inner = np.linalg.pinv(jacobian).reshape(len(found), len(c), 2)
     gradient = np.einsum("vp,pja,jab->vjb", outer, inner, weights)
-    return np.array([k, *np.degrees(angles)]), np.asarray(gradient)
+    gradient[1:] /= unit
+    return np.array([unit * k, *np.degrees(angles)]), np.asarray(gradient)
+
+
+def _of_size_1(c: FloatArray, weights: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """The coefficients' size, and they and their weights in it: beside angles in rad they are as large."""
+    unit = float(np.abs(c).max()) or 1.0
+    return unit, c / unit, weights * unit
 
 
 def pairs_of(angles_deg: Sequence[float]) -> FloatArray:
@@ -180,6 +188,7 @@ def check_order(
         If the output does not follow the table rate, or the turns contradict the order of the states.
     """
     _check_follows(c, weights, dof, source)
+    _, c, weights = _of_size_1(c, weights)
     common = np.ones((len(STATES), 1))
     redundant = 2 * len(STATES) - 4
 

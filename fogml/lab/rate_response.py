@@ -94,16 +94,16 @@ def _wave(basis: FloatArray, values: FloatArray) -> tuple[complex, float]:
 
 
 def bandwidth(gains: Sequence[Gain], scale_factor: float = 1.0) -> Bandwidth | None:
-    """Bandwidth from gains at two frequencies or more, relative to the scale factor at rest; else None.
+    """Bandwidth from gains at two frequencies or more, relative to the scale factor's size; else None.
 
     A first-order loop has ``(K / gain)**2 - 1 = (f / f_3)**2``, which is linear in ``f**2``.
     """
     if len(gains) < 2:
         return None
-    ordered = sorted(gains, key=lambda one: one.frequency_hz)
+    ordered, scale = sorted(gains, key=lambda one: one.frequency_hz), abs(scale_factor)
     f = np.array([one.frequency_hz for one in ordered])
-    gain = np.array([one.gain for one in ordered]) / scale_factor
-    error = np.array([max(one.se, 1e-12 * one.gain) for one in ordered]) / scale_factor
+    gain = np.array([one.gain for one in ordered]) / scale
+    error = np.array([max(one.se, 1e-12 * one.gain) for one in ordered]) / scale
     below = np.flatnonzero(gain < HALF_POWER)
     half_power = None
     if len(below) and below[0] > 0:

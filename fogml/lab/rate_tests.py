@@ -232,33 +232,44 @@ def near_zero(plateaus: Plateaus, greatest: float, criteria: Criteria) -> Platea
     return plateaus[np.abs(plateaus.rate) < criteria.small * greatest]
 
 
+def _zero_of(small: Plateaus) -> float | None:
+    """The rate that small ones come on top of [deg/h], where the output is zero if the table is set so.
+
+    To it the table returns most; else it is the middle of a ladder of both senses.
+    """
+    if len(small) < LEAST_FOR_DRIFT:
+        return None
+    rates, count = np.unique(merged(small.rate, small.rate_error), return_counts=True)
+    returned = rates[count == max(count.max(), LEAST_FOR_DRIFT)]
+    if len(returned) == 1:
+        return float(returned[0])
+    return 0.5 * float(rates[0] + rates[-1]) if rates[0] < 0.0 < rates[-1] else None
+
+
 def zero_answers(small: Plateaus, scale_factor: float, criteria: Criteria) -> list[Answer]:
     """Which share of each small rate shows, by size, in both senses together.
 
-    Rates count from the middle of the ladder: where the output is zero, if the table is set so, which for a
-    gyro with a bias is not where the rate is. The output there, over time, is what they come on top of; where
-    the ladder has no middle, the means of both senses are.
+    They are told from the output at the rate that they come on top of, over time; where that does not come
+    again, from the means of both senses. Sizes of one sense are left out: a zone about zero has two ends.
     """
-    if len(small) < 3:
+    if (zero := _zero_of(small)) is None:
         return []
-    rate = small.rate - 0.5 * (small.rate.min() + small.rate.max())
+    rate = small.rate - zero
     sizes = merged(np.abs(rate), small.rate_error)
-    middle = np.abs(rate) <= ROUND_OFF_DEG_H + small.rate_error.max()
-    tested = np.unique(sizes[~middle])
-    of_size = np.sign(rate)[:, None] * (sizes[:, None] == tested)
+    sense = np.sign(rate) * (np.abs(rate) > ROUND_OFF_DEG_H + small.rate_error.max())
+    tested = np.intersect1d(sizes[sense > 0.0], sizes[sense < 0.0])
+    kept = (sense == 0.0) | np.isin(sizes, tested)
+    small, sizes, sense = small[kept], sizes[kept], sense[kept]
     since = small.time - small.time.mean()
     steady = np.column_stack([np.ones(len(small)), since / max(np.ptp(since), 1.0)])
-    if middle.sum() >= LEAST_FOR_DRIFT:
-        bias = np.linalg.lstsq(steady[middle], small.output[middle], rcond=None)[0]
-    else:
-        matrix = np.column_stack([steady, of_size])
-        bias = np.linalg.lstsq(matrix, small.output, rcond=None)[0][:2]
-    above = np.sign(rate) * (small.output - steady @ bias)
+    rows = sense == 0.0 if np.sum(sense == 0.0) >= LEAST_FOR_DRIFT else np.ones(len(small), dtype=np.bool_)
+    matrix = np.column_stack([steady, sense[:, None] * (sizes[:, None] == tested)])
+    bias = np.linalg.lstsq(matrix[rows], small.output[rows], rcond=None)[0][:2]
+    above = sense * (small.output - steady @ bias)
     answers = []
     for size in tested.tolist():
         here, expected = sizes == size, abs(scale_factor) * size
-        senses = [above[here & (np.sign(rate) == sense)] for sense in (1.0, -1.0)]
-        shown = float(np.mean([part.mean() for part in senses if len(part)])) / expected
+        shown = float(np.mean([above[here & (sense == way)].mean() for way in (1.0, -1.0)])) / expected
         noise = small.error[here] ** 2 + small.rate_error[here] ** 2
         se = float(np.sqrt(noise.mean() / here.sum())) / expected
         if se <= criteria.doubt:

@@ -123,7 +123,7 @@ def _response(values: Mapping[str, Any]) -> list[ResultRow]:
         else:
             scale = (values["scale_factor"] or {"scale_factor": 1.0})["scale_factor"]
             gains = sorted((one["frequency_hz"], one["gain"]) for one in values["gains"])
-            low = gains[0][1] < HALF_POWER * scale
+            low = gains[0][1] < HALF_POWER * abs(scale)
             between = f"< {number(gains[0][0])}" if low else f"> {number(gains[-1][0])}"
             remark = "gain 0.707 lies beyond the frequencies tested"
         rows.append(ResultRow("bandwidth", between, "", "Hz", remark))

@@ -37,7 +37,8 @@ from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_c
 from fogml.models.compact import Compact, affine
 from fogml.models.feature_model import resolve_features, written_out
 from fogml.models.folds import dealt_folds
-from fogml.models.intervals import interval_table, out_of_fold_intervals
+from fogml.models.intervals import out_of_fold_intervals
+from fogml.models.joint_rows import averages_with_turns, check_turns
 from fogml.models.linear import LinearRegressor
 from fogml.models.row_noise import noise_covariance
 from fogml.models.table import RunRows, TrainingTable, row_count, without_refilling
@@ -46,10 +47,6 @@ from fogml.numerals import number_text
 from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.strict import Strict, strictly
-
-_LEAST_TURN_DEG_S = 0.1
-# Under this a turn tells the scale factor worse than 100 ppm at 0.1 deg/h of drift: no calibration.
-_LEAST_TURNING_ROWS = 10
 
 
 class _Saved(Strict):
@@ -140,7 +137,7 @@ class JointModel(DriftModel):
         if self._bias_text is not None:
             resolve_features(self._bias_text, group)
         rows = [self._rows(run) for run in group]
-        _check_turns(group, rows)
+        check_turns([run.name for run in group], rows)
         learn_box(self.features_, [part.atoms[:, 1:] for part in rows])
         parts = [self._part(part) for part in rows]
         self.regressor_ = LinearRegressor(fit_intercept=not self.patent).fit_parts(parts)
@@ -153,7 +150,7 @@ class JointModel(DriftModel):
         self.card_ = training_card(
             group, hashes=hashes, rows=row_count(rows), features=self.features_, notes=notes
         )
-        table = interval_table(rows, lambda part: np.column_stack((self._columns(part), part)))
+        table = averages_with_turns(rows, lambda part: np.column_stack((self._columns(part), part)))
         self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
         return self
 
@@ -308,18 +305,3 @@ def _has_gradient(run: Run) -> bool:
     except InputError:
         return False
     return True
-
-
-def _check_turns(runs: Sequence[Run], rows: Sequence[RunRows]) -> None:
-    """Refuse training rows from which no scale factor can be told."""
-    row_count(rows)
-    y = np.concatenate([part.y for part in rows])
-    middle = np.median(y)
-    away = np.abs(y - middle) > 3600.0 * _LEAST_TURN_DEG_S
-    if np.count_nonzero(away) < _LEAST_TURNING_ROWS:
-        names = ", ".join(run.name for run in runs)
-        raise InputError(
-            f"{names}: no turns: the joint model needs turns of the table, both ways and at several "
-            f"temperatures, in a column 'rate [deg/s]' (at least {_LEAST_TURNING_ROWS} samples at rates "
-            f"{_LEAST_TURN_DEG_S} deg/s apart); use a drift model such as polynomial for a run at rest"
-        )

@@ -125,7 +125,7 @@ def _gains(values: Mapping[str, Any]) -> tuple[str, Markup, str] | None:
     first = values["bandwidth"]["first_order_hz"] if values["bandwidth"] else None
     if first is not None:
         fine = np.geomspace(f[0], f[-1], 200)
-        scale = values["scale_factor"]["scale_factor"] if values["scale_factor"] else 1.0
+        scale = abs(values["scale_factor"]["scale_factor"]) if values["scale_factor"] else 1.0
         curve = scale / np.sqrt(1.0 + (fine / first) ** 2)
         curves.append(Curve(fine, curve, style.VERMILION, dash="6 3", label="first-order loop"))
     curves.append(Curve(f[[0, -1]], np.full(2, np.sqrt(0.5)), style.BLACK, dash="4 3", label="0.707"))

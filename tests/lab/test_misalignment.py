@@ -236,6 +236,18 @@ def test_intervals_cover_where_tilt_settings_err() -> None:
     assert min(inside.values()) >= 178, inside
 
 
+@pytest.mark.parametrize("size", [1e-10, 1e10])
+def test_an_output_in_any_unit_has_the_same_angles(size: float) -> None:
+    """As amperes of a photocurrent, or counts of a fine angle."""
+    in_volts = measurements(UNIT, TILTS, RATES, noise=1e-3, seed=2)
+    plain, scaled = decouple(in_volts), decouple(replace(in_volts, output=size * in_volts.output))
+    assert size * plain.K == pytest.approx(scaled.K, rel=1e-9)
+    assert plain.delta_x_deg == pytest.approx(scaled.delta_x_deg, rel=1e-6)
+    assert plain.se is not None and scaled.se is not None
+    assert plain.se["delta_deg"] == pytest.approx(scaled.se["delta_deg"], rel=1e-6)
+    assert size * float(plain.se["K"]) == pytest.approx(scaled.se["K"], rel=1e-6)
+
+
 def test_zero_misalignment_lies_in_the_interval() -> None:
     spans = [
         decouple(measurements(TableUnit(2.0), TILTS, RATES, noise=0.01, seed=seed), False).intervals[

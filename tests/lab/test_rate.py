@@ -202,6 +202,56 @@ def test_earth_rate_counts_where_zero_is() -> None:
     assert told["threshold"]["below_deg_h"] == pytest.approx(1.0)
 
 
+BOTH, ONE = (2.0, -2.0, 5.0, -5.0, 10.0, -10.0, 20.0, -20.0), (2.0, 5.0, 10.0, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("small", "zero", "rests", "told"),
+    [
+        (BOTH, 0.0, True, (10.0, 20.0)),
+        (BOTH, 0.0, False, (10.0, 20.0)),
+        (BOTH, -40.0, True, (10.0, 20.0)),
+        (ONE, 0.0, True, None),
+        (ONE, 0.0, False, None),
+        ((10.0, 20.0, 30.0, 40.0), 0.0, False, None),
+        ((*BOTH, 30.0), 0.0, True, (10.0, 20.0)),
+    ],
+)
+def test_a_threshold_is_told_of_both_senses_about_where_the_table_returns_to(
+    small, zero, rests, told
+) -> None:
+    """A gyro that is silent up to 15 deg/h about a rate; one sense alone has another middle."""
+    between = [[zero + rate, zero] if rests else [zero + rate] for rate in small]
+    rates = np.concatenate([[0.0, 36000.0, 0.0, -36000.0, 0.0, zero], *between, [0.0]])
+    rate = np.repeat(rates, 60)
+    off = rate - zero
+    gyro = off * (np.abs(off) > 15.0) + 0.05 * np.random.default_rng(3).standard_normal(len(rate))
+    run = Run("small", {"time": 1.0 * np.arange(len(rate)), "gyro": gyro, "rate": rate / 3600.0}, Facts())
+    values = rate_json([run], source="table")
+    if told is None:
+        assert values["threshold"] is None and values["dead_zone"] is None
+        assert any("rates of both senses about zero" in note for note in values["notes"])
+        return
+    assert tuple(values["threshold"].values()) == pytest.approx(told)
+    assert tuple(values["dead_zone"].values()) == pytest.approx((2.0 * told[0], 2.0 * told[1]))
+
+
+@pytest.mark.parametrize("scale", [1.0, -1.0, 2.5])
+def test_a_bandwidth_is_the_same_of_an_output_of_either_sign(scale: float) -> None:
+    """A first-order loop of 2 Hz, sampled densely; an output that counts the other way has the same gains."""
+    time, parts = 0.01 * np.arange(2000), [np.repeat([0.0, 10.0, -10.0, 0.0], 500)]
+    output = [parts[0]]
+    for hertz in (0.5, 1.0, 2.0, 4.0):
+        phase, lag = 2.0 * math.pi * hertz * time, math.atan(hertz / 2.0)
+        parts += [5.0 * np.sin(phase), np.zeros(500)]
+        output += [5.0 * math.cos(lag) * np.sin(phase - lag), np.zeros(500)]
+    rate, gyro = np.concatenate(parts), 3600.0 * scale * np.concatenate(output)
+    run = Run("waves", {"time": 0.01 * np.arange(len(rate)), "gyro": gyro, "rate": rate}, Facts())
+    told = rate_json([run], source="table")
+    assert told["scale_factor"]["scale_factor"] == pytest.approx(scale, rel=1e-4)
+    assert told["bandwidth"]["half_power_hz"] == pytest.approx(2.0, rel=0.01)
+
+
 def test_gain_of_a_delayed_wave_by_hand() -> None:
     time = 1e-3 * np.arange(4000.0)
     omega = 2.0 * math.pi * 5.0
@@ -216,9 +266,11 @@ def test_gain_of_a_delayed_wave_by_hand() -> None:
     assert bandwidth([found]) is None
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("gains", "told"), [((1.0, 0.9), "> 300"), ((0.6, 0.3), "< 100")])
-def test_a_bandwidth_beyond_the_frequencies_tested_says_on_which_side(gains, told) -> None:
+def test_a_bandwidth_beyond_the_frequencies_tested_says_on_which_side(gains, told, sign) -> None:
     values = rate_json([by_hand(np.array([0.0, 10.0, -10.0, 0.0]))], source="table")
+    values["scale_factor"]["scale_factor"] *= sign
     values["gains"] = [{"frequency_hz": f, "gain": g} for f, g in zip((100.0, 300.0), gains)]
     values["bandwidth"] = {"half_power_hz": None, "first_order_hz": None}
     (row,) = (row for row in result_rows(values) if row.quantity == "bandwidth")

@@ -159,6 +159,17 @@ def test_product_column_is_found():
         JointModel(patent=True, product=True).fit(run)
 
 
+@pytest.mark.parametrize("step_s", [8, 20])
+def test_an_interval_is_told_where_turns_are_too_short_for_averages(step_s):
+    """What is cut about changes of the rate leaves no 50 s of a turn together, as 100 s averages need."""
+    run = staircase(noise=3.0)
+    count = len(run) // step_s * step_s
+    means = {name: values[:count].reshape(-1, step_s).mean(axis=1) for name, values in run.columns.items()}
+    intervals = JointModel().fit(Run("coarse", means, FACTS)).intervals_
+    noise = 3.0 / np.sqrt(intervals.averaging_s)
+    assert noise < intervals.half_width(0.9) < 3.0 * noise
+
+
 def test_unknown_earth_rate_is_noted():
     model = JointModel().fit(staircase(facts=Facts()))
     assert any("Earth rate" in note for note in model.card_.notes)
