@@ -112,6 +112,12 @@ _LONGEST_NAME = 240
 """Bytes of a lock's name: file systems hold 255, its dot and suffix among them."""
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """Errors of a disk that takes no more."""
+REMEDIES = {
+    **dict.fromkeys(NO_ROOM, "make room and run the command again"),
+    errno.EROFS: "choose another place",
+    errno.ENAMETOOLONG: "choose a shorter name",
+}
+"""What to do where something can't be written."""
 
 
 @contextmanager
@@ -169,7 +175,8 @@ _LOCK_OF_OUTPUT = re.compile(r"\..+\.lock\Z")
 def unwritable(path: str | Path, error: OSError) -> Exception:
     """The error of a full disk with the output's name; of anything else that forbids writing, one message."""
     if error.errno in NO_ROOM:
-        return OSError(error.errno, error.strerror, str(path))
+        # What libraries say of it may be longer.
+        return OSError(error.errno, os.strerror(error.errno or 0), str(path))
     return InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place")
 
 

@@ -17,7 +17,7 @@ import click
 from fogml import __version__
 from fogml.cli.given import HELP_NAMES, HelpContext, load
 from fogml.errors import FogmlError, did_you_mean, printable
-from fogml.locks import NO_ROOM
+from fogml.locks import REMEDIES
 from fogml.processes import end_as_interrupted, heed_interrupt, quiet_libraries
 
 COMMANDS = {
@@ -181,8 +181,8 @@ class Program(Group):
             raise
         except OSError as error:
             place = f"{error.filename}: " if error.filename else ""
-            remedy = "; make room and run the command again" if error.errno in NO_ROOM else ""
-            fail(f"{place}{error.strerror or error}{remedy}")
+            remedy = REMEDIES.get(error.errno or 0)
+            fail(f"{place}{error.strerror or error}{f'; {remedy}' if remedy else ''}")
         except UnicodeEncodeError as error:
             # Python takes any bytes for a name; the libraries that read and write files take text.
             name = re.search(r"\S*[\udc80-\udcff]\S*", str(error.object))

@@ -101,7 +101,8 @@ def _draft(settings: ImportSettings, terminal: Terminal) -> None:
     for run in runs:
         first = run[:_FIRST_ROWS]
         rows = [[f"{values[i]:.9g}" for values in first.columns.values()] for i in range(len(first))]
-        terminal.table(f"{run.name}: the first rows", [header(name) for name in run.columns], rows)
+        heads = [header(name, run.gyro_unit if name == "gyro" else None) for name in run.columns]
+        terminal.table(f"{run.name}: the first rows", heads, rows)
         shown.append({"run": run.name, "rows": len(run), "span_s": run.span_s})
     terminal.result({"schema": "fogml.import/1", "profile": text, "runs": shown})
 

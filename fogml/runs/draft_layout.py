@@ -15,7 +15,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.runs.columns import parse_header
 from fogml.runs.csv_dialect import decoded_head
-from fogml.runs.csv_header import fields_of, is_number_like, labview_header, with_cells_above
+from fogml.runs.csv_header import Header, fields_of, is_number_like, labview_header, with_cells_above
 from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
 from fogml.runs.header_spelling import canonical_cells, with_units_below
 from fogml.runs.profile_parts import SEPARATORS
@@ -129,9 +129,10 @@ class _Header:
 
 
 def _are_names(cells: Sequence[str]) -> bool:
-    """Whether the cells of a line are names, a few numbers beside them apart."""
-    numbers = sum(is_number_like(cell.strip(' "')) for cell in cells)
-    return 2 * numbers < sum(bool(cell.strip()) for cell in cells)
+    """Whether the cells of a line are names, numbers beside those of a time and a gyro apart."""
+    if not any(is_number_like(cell.strip(' "')) for cell in cells):
+        return True
+    return Header(0, 1, "", canonical_cells([cell.strip(' "') for cell in cells])).is_sure
 
 
 def _are_below(path: Path, encoding: str, mark: str | None, rows: Sequence[Sequence[str]]) -> bool:

@@ -239,9 +239,11 @@ class _Reader:
         short = counts != fields
         if short.any():
             line = self.lines_before + int(numbers[np.argmax(short)])
-            fault = f"{fields} fields were expected, line {line + 1} has {int(counts[np.argmax(short)])}"
             if not self.profile.reject.wrong_field_count or 2 * np.count_nonzero(short) > len(numbers):
-                raise InputError(f"{self.file}: {fault} ({int(short.sum())} such rows); {self.hint}")
+                held = f"has {int(counts[np.argmax(short)])} ({counted(int(short.sum()), 'such row')})"
+                cure = "correct it, or leave such rows out by 'reject: {wrong_field_count: true}'"
+                told = f"{fields} fields were expected, line {line + 1} {held}"
+                raise InputError(f"{self.file}: {told}; {cure} in the profile; {self.hint}")
             self._reject(f"without {fields} fields", short)
         rows = np.flatnonzero(~short)
         content = lines.keep(numbers[rows])

@@ -232,6 +232,8 @@ def test_what_is_no_number_is_told_without_a_type_of_python(option, value, told)
     [
         (InputError("a.csv: column 'time' is missing"), "a.csv: column 'time' is missing"),
         (OSError(errno.ENOSPC, "No space left on device", "/tmp/x"), "/tmp/x: No space left on device"),
+        (OSError(errno.EROFS, "Read-only", "out"), "out: Read-only; choose another place"),
+        (OSError(errno.ENAMETOOLONG, "Too long", "out"), "out: Too long; choose a shorter name"),
         (PermissionError(errno.EACCES, "Permission denied", "out"), "out: Permission denied"),
         (MemoryError(), "not enough memory"),
         (UnicodeEncodeError("utf-8", "a\udcff.csv", 1, 2, "surrogates not allowed"), "no text in UTF-8"),

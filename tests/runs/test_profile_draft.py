@@ -322,3 +322,29 @@ def test_a_gyro_of_no_numbers_is_no_other_column(tmp_path):
     assert "'2. Mai 2026 08:0' is no date that is read" in profile.read_text()
     with pytest.raises(InputError, match=r"column 'gyro \[deg/h\]': '\(0\)' is no number"):
         import_recording(path, profile)
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit", "told"), [(1e3, "ms", "1.00 s"), (1e6, "us", "1.00 s"), (1e9, "ns", "1.00 s")]
+)
+def test_a_clock_that_would_show_centuries_in_seconds_counts_less(tmp_path, scale, unit, told):
+    rows = "".join(f"{int(scale * (1767600000 + i))};{7 + i % 3};{20 + i}\n" for i in range(COUNT))
+    (tmp_path / "log.csv").write_text("timestamp;gyro [deg/h];T [degC]\n" + rows)
+    (tmp_path / "p.yaml").write_text(draft := draft_profile(tmp_path / "log.csv"))
+    assert f"unit: {unit}}}    # GUESS: steps of " in draft and told in draft
+    (run,) = import_recording(tmp_path / "log.csv", tmp_path / "p.yaml")
+    np.testing.assert_allclose(run.time, np.arange(COUNT), atol=1e-3)
+
+
+def test_a_remark_with_a_date_is_no_header(tmp_path):
+    rows = "".join(f"{i} {7 + i % 3}.5 {20 + i} 0 1 2\n" for i in range(COUNT))
+    (tmp_path / "log.txt").write_text("% 2014-03-21 17:31:51 by a fitter\n" + rows)
+    draft = draft_profile(tmp_path / "log.txt")
+    assert "header: false" in draft and "skip_lines: 1" in draft
+
+
+def test_the_first_rows_of_counts_are_in_counts(tmp_path):
+    rows = "".join(f"{i},{1000 + i % 7}\n" for i in range(COUNT))
+    (tmp_path / "log.csv").write_text("time [s],gyro [count]\n" + rows)
+    outcome = CliRunner().invoke(app, ["import", str(tmp_path / "log.csv"), "--draft"])
+    assert "gyro [count]" in outcome.stdout.partition("the first rows")[2]
