@@ -13,9 +13,9 @@ from fogml.escaping import CCode
 from fogml.export.c_float import literal, sensor_identifier
 from fogml.export.c_program import run_self_test, write_files
 from fogml.export.c_source import HEADER, SOURCE, project_files, templates
-from fogml.export.check import runs_of_each
 from fogml.export.documentation import DOCUMENTATION_FILE
 from fogml.export.export import export_model
+from fogml.export.losses import runs_of_each
 from fogml.export.plan import Plan
 from fogml.export.settings import SCHEMA, ExportSettings, report_tail
 from fogml.export.tables import by_axis, read_matrix

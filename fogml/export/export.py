@@ -14,19 +14,18 @@ from fogml.export.c_program import CProgram, cortex_m4_size, instructions_per_sa
 from fogml.export.c_source import RUST_FILE, c_source, number_of, project_files, rust_bindings
 from fogml.export.check import (
     Difference,
-    TrainingRows,
-    accuracy_loss,
     c_difference,
+    direction_flip,
     expected_outputs,
     pipeline_difference,
     plan_error,
-    training_rows,
     value_difference,
 )
 from fogml.export.documentation import DOCUMENTATION_FILE, card_lines, documentation, export_card
 from fogml.export.false_readings import false_reading_lines, false_readings
 from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.layout import layout
+from fogml.export.losses import TrainingRows, accuracy_loss, training_rows
 from fogml.export.plan import Plan
 from fogml.export.points import box_points, reached_points
 from fogml.export.prune import pruned
@@ -153,7 +152,10 @@ def _write_c(
     plan: Plan, folder: Path, dtype: str, card: dict[str, Any], seed: int
 ) -> tuple[dict[str, Any], Plan]:
     false = false_readings(plan, seed)
-    proven, lines = None, [*card_lines(card, plan, dtype), *false_reading_lines(false)]
+    proven, flip = None, direction_flip(plan, seed)
+    lines = [*card_lines(card, plan, dtype), *false_reading_lines(false)]
+    if flip is not None:
+        lines.append(f"directions    told otherwise about a dead band make up to {short(flip)} deg/h")
     if number_of(dtype) == "fixed":
         proven = fixed_point_error(plan, layout(plan, "fixed"), dtype)
         lines += fixed_point_lines(proven, plan)
@@ -177,6 +179,7 @@ def _write_c(
     clock = {**CLOCK, "bits": source.layout.clock_bits}
     report: dict[str, Any] = {"difference": difference, "cortex_m4": size, "clock": clock}
     report |= {} if false is None else {"false_readings": false}
+    report |= {} if flip is None else {"direction_flip_deg_h": flip}
     windows = source.layout
     if windows.binned:
         report["bins"] = {"held": windows.ring, "seconds": windows.bin_samples * plan.sample_s}

@@ -13,8 +13,8 @@ from numpy.polynomial import Polynomial
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, quoted
 from fogml.export import segment_files
-from fogml.export.check import averaged_loss, runs_of_each, training_rows
 from fogml.export.documentation import export_card
+from fogml.export.losses import averaged_loss, runs_of_each, training_rows
 from fogml.export.plan import Plan
 from fogml.export.segments import Segments, segments
 from fogml.export.settings import SCHEMA, report_tail

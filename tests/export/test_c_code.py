@@ -621,3 +621,20 @@ def test_sums_of_a_bin_fit_however_fast_its_temperature_changes(tmp_path, dtype)
         T = np.round(T / source.numbers["fixed"]["temperature_value"])
     _, flag = program.steps(4000 * np.arange(20_000, dtype=np.int64), T[:, None], np.zeros(20_000))
     assert source.layout.bin_samples == 7032 and np.all(flag == 2)
+
+
+def test_what_a_direction_makes_that_is_told_otherwise_is_stated(tmp_path):
+    """About its dead band less than a step of the thermometer decides, which bins do not hold."""
+    model = make_model("polynomial", features="T_in, dT_in, T_in*sign(dT_in)").fit(training_run())
+    fast = fast_run(0.05, 16.0)
+    run = Run("slow", fast.columns | {"time": 5.0 * fast.time})
+    report = export_model(model, tmp_path, ExportSettings("c", "float64", sample_s=0.25))
+    source = c_source(Plan.of(model, 0.25), "float64", [])
+    out, _ = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
+    expected = model.compensate(run)
+    off = np.abs(out - expected.compensated)[expected.flag == 0].max()
+    flip = report["direction_flip_deg_h"]
+    assert 100.0 * report["largest_difference"] < off < flip
+    # Of the hottest or coldest temperature, as the coefficient is per degC.
+    ends = np.abs(model.features_.box["T_in"]).max()
+    assert flip == pytest.approx(abs(source.plan.arrays["linear"][2]) * ends, rel=0.01)

@@ -16,8 +16,8 @@ from scipy.io import loadmat
 from experiments.synthetic_world import World, cycle
 from fogml.errors import InputError
 from fogml.export.c_float import literal
-from fogml.export.check import training_rows
 from fogml.export.export import export_model
+from fogml.export.losses import training_rows
 from fogml.export.plan import Plan
 from fogml.export.points import box_points, history, reached_points
 from fogml.export.prune import pruned
