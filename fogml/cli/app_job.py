@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
@@ -194,7 +195,14 @@ def serve(settings: AppSettings, terminal: Terminal) -> None:
 
     limits = Limits(int(settings.upload_limit * 1e6), settings.jobs, settings.idle)
     # A second server of the folder would start its waiting jobs again.
-    with sole_writer(home / "server"):
+    with ExitStack() as held:
+        try:
+            held.enter_context(sole_writer(home / "server"))
+        except InputError as error:
+            who = str(error).partition(";")[0].rpartition(": ")[2]
+            raise InputError(
+                f"{home}: another fogml app serves this folder ({who}); open the address that it printed, or end it"
+            ) from None
         app = App(home, forms(), words_of, limits)
         listening, address = listen(app, settings.port)
         terminal.result({"address": address, "folder": str(home)})

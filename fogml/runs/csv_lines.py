@@ -192,10 +192,10 @@ class LineReader:
             value = dialect.value(text)
             if value is None and i in dialect.known:
                 mark = "comma" if dialect.decimal == "," else "point"
-                raise _Fault(
-                    f"line {line}, column {quoted(dialect.name(i))}: {quoted(text.strip())} is not a number "
-                    f"(with a decimal {mark})"
-                )
+                what = f"is not a number (with a decimal {mark})"
+                if dialect.name(i) == "time" and ":" in text:
+                    what = "is no date or time of day that is read, such as 2026-03-02T08:00:00+01:00"
+                raise _Fault(f"line {line}, column {quoted(dialect.name(i))}: {quoted(text.strip())} {what}")
             if value is None:
                 self.text_lines.setdefault(i, line)
                 value = np.nan

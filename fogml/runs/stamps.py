@@ -24,7 +24,7 @@ _DATE = (
 )
 _TIME = (
     r"(?P<H>\d{1,4}):(?P<M>\d{2})(?::(?P<S>\d{2})(?:[.,:](?P<F>\d{1,9}))?)?"
-    r"\s*(?P<p>[AaPp][Mm])?\s*(?P<z>Z|UTC|[+-]\d{2}:?\d{2})?"
+    r"\s*(?P<p>[AaPp][Mm])?\s*(?P<z>Z|UTC|GMT|[+-]\d{2}:?\d{2})?"
 )
 _FORMS = {
     "date and time": rf"^\s*{_DATE}(?:\s*T\s*|[\s_,;]+){_TIME}\s*$",
@@ -33,7 +33,7 @@ _FORMS = {
     "minutes and seconds": r"^\s*(?P<M>\d{1,3}):(?P<S>\d{2})[.,](?P<F>\d{1,9})\s*$",
     "date and time without marks": (
         r"^\s*(?P<a>\d{4})(?P<b>\d{2})(?P<c>\d{2})\s*[T_ -]\s*(?P<H>\d{2}):?(?P<M>\d{2}):?(?P<S>\d{2})"
-        r"(?:[.,](?P<F>\d{1,9}))?\s*(?P<z>Z|UTC|[+-]\d{2}:?\d{2})?\s*$"
+        r"(?:[.,](?P<F>\d{1,9}))?\s*(?P<z>Z|UTC|GMT|[+-]\d{2}:?\d{2})?\s*$"
     ),
     "fraction of a second": r"^\s*(?P<F>\d{1,9})\s*$",
 }
@@ -248,7 +248,7 @@ def _seconds(parts: dict[str, Any]) -> tuple[IntArray, BoolArray]:
     half = np.asarray(compute.utf8_lower(compute.fill_null(parts["p"], "")).to_numpy(zero_copy_only=False))
     hour = np.where(half == "pm", hour % 12 + 12, np.where(half == "am", hour % 12, hour))
     fraction = _whole(compute.utf8_rpad(compute.fill_null(parts["F"], ""), 9, "0"))
-    zone = compute.replace_substring_regex(compute.fill_null(parts["z"], ""), "^(Z|UTC)$", "+0000")
+    zone = compute.replace_substring_regex(compute.fill_null(parts["z"], ""), "^(Z|UTC|GMT)$", "+0000")
     zone = _whole(compute.replace_substring(compute.replace_substring(zone, ":", ""), "+", ""))
     east = np.sign(zone) * (np.abs(zone) // 100 * 60 + np.abs(zone) % 100)
     return ((hour * 60 + minute - east) * 60 + second) * _NS + fraction, wrong

@@ -170,7 +170,8 @@ def test_a_bad_form_is_one_line_and_no_job(app):
 def test_a_port_or_folder_that_is_taken_is_said(app, tmp_path):
     port = app.host.partition(":")[2]
     assert f"--port {port}" in run_program("app", tmp_path / "other", "--port", port, status=2).stderr
-    assert "another" in run_program("app", app.folder, "--port", "0", status=2).stderr
+    told = run_program("app", app.folder, "--port", "0", status=2).stderr
+    assert "another fogml app serves this folder (process" in told and "--out" not in told
     (tmp_path / "file").write_text("x")
     assert "is a file" in run_program("app", tmp_path / "file", status=2).stderr
 

@@ -6,6 +6,7 @@ import numpy as np
 import pyarrow as arrow
 import pytest
 
+from fogml.errors import InputError
 from fogml.runs.arrival_times import spread_stamps
 from fogml.runs.reading import read_blocks, read_run
 from fogml.runs.stamps import StampClock, stamps_of
@@ -61,3 +62,15 @@ def test_a_year_behind_a_dash_is_no_zone(tmp_path, date, clock, zone):
     started = read_run(tmp_path / "run.csv").facts.started
     assert (None if started.utcoffset() is None else started.utcoffset().total_seconds()) == zone
     assert (started.day, started.hour) == (23, 8 if zone is None else 7)
+
+
+def test_greenwich_is_a_zone_and_a_date_that_is_not_read_is_told_as_one(tmp_path):
+    lines = [f"2026-03-23 08:00:{i:02d} ZONE,7.{i}" for i in range(30)]
+    text = "\n".join(["time,gyro [deg/h]", *lines]) + "\n"
+    (tmp_path / "run.csv").write_text(text.replace("ZONE", "GMT"))
+    assert read_run(tmp_path / "run.csv").facts.started.isoformat() == "2026-03-23T08:00:00+00:00"
+    (tmp_path / "run.csv").write_text(text.replace("ZONE", "CET"))
+    with pytest.raises(
+        InputError, match="'2026-03-23 08:00:00 CET' is no date or time of day that is read, such as"
+    ):
+        read_run(tmp_path / "run.csv")
