@@ -201,7 +201,8 @@ def serve(settings: AppSettings, terminal: Terminal) -> None:
         except InputError as error:
             who = str(error).partition(";")[0].rpartition(": ")[2]
             raise InputError(
-                f"{home}: another fogml app serves this folder ({who}); open the address that it printed, or end it"
+                f"{home}: another fogml app serves this folder ({who}); open the address that it printed, or "
+                "end it first"
             ) from None
         app = App(home, forms(), words_of, limits)
         listening, address = listen(app, settings.port)
