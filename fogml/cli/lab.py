@@ -92,6 +92,10 @@ class RateSettings(Settings):
         super().check_given()
         if bool(self.runs) == bool(self.twin):
             raise InputError("give recorded runs, or --twin to test a twin; one of the two")
+        if self.runs:
+            self.refuse_idle(
+                ("greatest", "noise"), "is of the test of a twin; leave it out with recorded runs"
+            )
 
 
 class NorthSettings(Settings):
@@ -142,6 +146,11 @@ class NorthSettings(Settings):
         super().check_given()
         if not self.positions and (self.azimuth is None or self.latitude is None):
             raise InputError("give a run with --positions, or --azimuth and --latitude for a simulation")
+        if self.positions:
+            simulated = ("dwell", "transfer", "drift", "transients", "start", "noise", "way", "coarse")
+            self.refuse_idle(simulated, "is of a simulation; leave it out with --positions")
+        else:
+            self.refuse_idle(("method", "settle"), "is of a recorded run; leave it out, or give --positions")
 
 
 class AcceptanceSettings(Settings):

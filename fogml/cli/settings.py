@@ -100,6 +100,26 @@ class Settings(Strict):
             if one.needed and not getattr(self, key):
                 raise InputError(one.needed)
 
+    def refuse_idle(self, names: Sequence[str], why: str) -> None:
+        """Refuse settings that would change nothing as the others are.
+
+        Parameters
+        ----------
+        names
+            Settings that may only be as they usually are.
+        why
+            What they belong to, and what to do.
+
+        Raises
+        ------
+        InputError
+            Naming the first that is stated.
+        """
+        for name in names:
+            if getattr(self, name) != type(self).model_fields[name].default:
+                own = given_settings(type(self))[name].names or ("--" + name.replace("_", "-"),)
+                raise InputError(f"{own[0].partition('/')[0]} {why}")
+
     def in_full(self) -> Self:
         """The settings with every path in full, to be run from anywhere; what ships keeps its name."""
         keys = (*self.path_keys, *self.written_keys)

@@ -72,6 +72,14 @@ class ReplaySettings(Settings):
     repair: options.Repair = False
     out: options.FileToWrite = None
 
+    def check_given(self) -> None:
+        """As `Settings.check_given`, and that what is said of storage is of runs before."""
+        super().check_given()
+        if not self.after:
+            self.refuse_idle(
+                ("storage_temperature",), "is of the time since another run; name it with --after"
+            )
+
 
 class DiagnoseSettings(Settings):
     """Where the gap between twin and recordings lies, which effect causes it, how far it closes.

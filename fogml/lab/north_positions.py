@@ -80,6 +80,7 @@ def north_from_positions(
     """
     if method not in METHODS:
         raise InputError(f"no method '{method}'; {known_are(method, METHODS)}")
+    check_design(design_matrix(order_deg, sense, None), False)
     stays = _stays(run, order_deg, sense, settle_s, angle_tolerance_deg)
     angles = np.asarray(order_deg, dtype=np.float64)[stays.positions.astype(int) - 1]
     plain_design = design_matrix(angles, sense, None)

@@ -161,9 +161,11 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
             # The run with the closest samples tells it best.
             slews += [] if found is None else [(float(np.median(np.diff(run.time))), found)]
     if not ladders and not gains:
+        more = f" beyond the {short(settle_s)} s that are left out" if settle_s else ""
         raise InputError(
             f"{', '.join(run.name for run in runs)}: holds no test on a rate table; the column "
-            "'rate [deg/s]' has to stay at two rates for some samples each, or to go to and fro as a sine"
+            f"'rate [deg/s]' has to stay at two rates for some samples each{more}, or to go to and fro as "
+            "a sine"
         )
     return _Read(ladders, gains, slews)
 

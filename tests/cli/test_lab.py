@@ -198,6 +198,13 @@ def test_three_positions_tell_no_drift_and_say_so(invoke_json) -> None:
         (("north", "--azimuth", 10, "--latitude", 10, "--way", "fast"), "way 'fast'"),
         (("north", "--azimuth", 10, "--latitude", 10, "--noise", -1), "'noise': Input should be greater"),
         (("north", "--positions", ".", "--azimuth", 1), "give one of them"),
+        (("north", "--positions", ".", "--drift", 0.2), "--drift is of a simulation"),
+        (("north", "--positions", ".", "--transient", "0.2,60"), "--transient is of a simulation"),
+        (("north", "--positions", ".", "--way", "fast"), "--way is of a simulation"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--settle", 5), "--settle is of a recorded run"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--method", "plain"), "or give --positions"),
+        (("rate", "shipped:thermal-cycle-1-x", "--noise"), "--noise is of the test of a twin"),
+        (("rate", "shipped:thermal-cycle-1-x", "--greatest", 20), "--greatest is of the test of a twin"),
     ],
 )
 def test_bad_usage_is_one_message(invoke, tmp_path: Path, monkeypatch, arguments, message: str) -> None:

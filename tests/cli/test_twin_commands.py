@@ -240,6 +240,8 @@ def test_a_units_runs_in_one_file_and_a_replay_after_the_first(tmp_path, invoke_
         invoke("replay", twin, second, "-o", out, *more)
         found[name] = np.abs(read_run(out).columns["replayed"] - read_run(second).gyro).max()
     assert found["after"] < 1e-6 < 0.05 < found["alone"]
+    refused = invoke("replay", twin, second, "-o", out, *stored, status=2).stderr
+    assert "--storage-temperature is of the time since another run" in refused
     again = invoke_json("simulate", tmp_path / "first.simulate.config.yaml")
     assert again["runs"] == told["runs"]
 
