@@ -38,8 +38,6 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
 
     assert settings.run and settings.model and settings.out
     out = Path(settings.out)
-    if out.exists() and Path(settings.run).exists() and out.samefile(settings.run):
-        raise InputError(f"{out}: is the run itself; choose another --out")
     # The run is looked into first: one of three axes takes a model each.
     blocks = iter(open_blocks(settings.run, repair=settings.repair, axis=settings.axis))
     begun = list(islice(blocks, 1))

@@ -53,6 +53,12 @@ class ImportSettings(Settings):
     repair: options.Repair = False
     out: options.FolderIfNamed = None
 
+    def check_given(self) -> None:
+        """As `Settings.check_given`, and that nothing is asked of an import where a draft is."""
+        super().check_given()
+        if self.draft:
+            self.refuse_idle(("profile", "axis"), "is of an import; leave it out with --draft")
+
 
 class InspectSettings(Settings):
     """Say what is in a run: columns, span, gaps, soaks and ramps, faults.

@@ -89,16 +89,26 @@ class Settings(Strict):
         return settings
 
     def check_given(self) -> None:
-        """Hold that nothing is missing that the job can't do without.
+        """Hold that nothing is missing that the job can't do without, and that no file to read is written.
 
         Raises
         ------
         InputError
-            With what to give.
+            With what to give, or which file it is.
         """
         for key, one in given_settings(type(self)).items():
             if one.needed and not getattr(self, key):
                 raise InputError(one.needed)
+        for out in self._files(self.written_keys):
+            for key in self.path_keys:
+                if any(os.path.samefile(out, path) for path in self._files([key])):
+                    raise InputError(f"{printable(out)}: is itself read ('{key}'); choose another --out")
+
+    def _files(self, keys: Sequence[str]) -> list[str]:
+        """Files that are there, of settings that name some."""
+        values = [getattr(self, key) for key in keys]
+        paths = [path for value in values for path in (value if isinstance(value, list) else [value])]
+        return [path for path in paths if isinstance(path, str) and os.path.isfile(path)]
 
     def refuse_idle(self, names: Sequence[str], why: str) -> None:
         """Refuse settings that would change nothing as the others are.

@@ -201,9 +201,6 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
     if settings.after and settings.truth:
         raise InputError("--after takes recorded runs, and --truth the truth of one; give one of the two")
     out = Path(settings.out)
-    for what, given in (("the run itself", settings.run), ("the truth", settings.truth)):
-        if given and out.exists() and Path(given).exists() and out.samefile(given):
-            raise InputError(f"{out}: is {what}; choose another --out")
     elsewhere = settings.twin not in twin_names() and is_simulator_output(settings.twin)
     if elsewhere and (settings.only or settings.truth or settings.after):
         raise InputError(f"{settings.twin}: a simulator's output takes no --only, --truth or --after")

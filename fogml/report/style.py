@@ -234,10 +234,11 @@ def log_axis(*values: float, room: float = 0.06) -> dict[str, Any]:
     Ticks are plain round numbers, as few as tell the scale: powers of ten, or 1, 2 and 5 times
     these, or finer. ``room`` is left on either side, as a share of the axis.
     """
-    positive = [value for value in values if value > 0.0] or [1.0]
+    positive = [value for value in values if 0.0 < value < math.inf] or [1.0]
     ends = math.log10(min(positive)), math.log10(max(positive))
     margin = room * max(ends[1] - ends[0], 0.5)
-    start, stop = ends[0] - margin, ends[1] + margin
+    # No tick is beyond what a number can be.
+    start, stop = max(ends[0] - margin, -307.0), min(ends[1] + margin, 307.0)
     for multiples in _MULTIPLES:
         ticks = [
             float(f"{m}e{power}")

@@ -115,7 +115,7 @@ def test_bad_usage(invoke, model, run_files, tmp_path):
     assert "no run" in invoke("compensate", status=2).stderr
     assert "no --model" in invoke("compensate", run, status=2).stderr
     assert "no --out" in invoke("compensate", run, "--model", model, status=2).stderr
-    assert "run itself" in invoke("compensate", run, "--model", model, "-o", run, status=2).stderr
+    assert "is itself read" in invoke("compensate", run, "--model", model, "-o", run, status=2).stderr
     assert "none" in invoke("compensate", run, "--model", tmp_path / "none", "-o", out, status=2).stderr
     wrong = invoke("compensate", run, "--model", model, "-o", tmp_path / "out.txt", status=2)
     assert ".csv" in wrong.stderr

@@ -122,6 +122,27 @@ def test_runs_beside_the_file_are_found(tmp_path, monkeypatch):
     assert settings.test == ["here.csv"]
 
 
+@pytest.mark.parametrize(
+    ("settings", "given"),
+    [
+        (ImportSettings, {"file": "a.csv", "draft": True}),
+        (CompensateSettings, {"run": "a.csv", "model": "."}),
+        (ReplaySettings, {"twin": "tactical", "run": "b.csv", "truth": "a.csv"}),
+        (ReplaySettings, {"twin": "tactical", "run": "b.csv", "after": ["b.csv", "a.csv"]}),
+        (SimulateSettings, {"schema": "fogml.simulate/1", "programme": "a.csv"}),
+    ],
+)
+@pytest.mark.parametrize("out", ["a.csv", "./linked.csv"])
+def test_a_file_that_is_read_is_never_written(tmp_path, monkeypatch, settings, given, out):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.csv", "b.csv"):
+        Path(name).write_text("time [s],gyro [deg/h]\n0,1\n")
+    Path("linked.csv").symlink_to("a.csv")
+    with pytest.raises(InputError, match=r"\.csv: is itself read"):
+        settings.model_validate({**given, "out": out}).check_given()
+    settings.model_validate({**given, "out": "c.csv"}).check_given()
+
+
 def test_written_settings_read_back_the_same(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("b.csv").touch()

@@ -87,7 +87,7 @@ def test_a_truth_of_the_run_s_stem_leaves_its_facts(config, tmp_path, invoke, su
     invoke("replay", "tactical", out, "-o", tmp_path / "again.csv", "--truth", truth)
     assert read_run(out).facts == facts
     refused = invoke("replay", "tactical", out, "-o", truth, "--truth", truth, status=2)
-    assert "is the truth" in refused.stderr
+    assert "is itself read ('truth')" in refused.stderr
 
 
 def test_a_simulation_of_other_facts_does_not_replace_them(config, tmp_path, invoke):

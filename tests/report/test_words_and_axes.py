@@ -92,6 +92,14 @@ def test_a_log_axis_holds_its_values_and_has_ticks_within(low: float, factor: fl
     assert len(axis["tickvals"]) == len(axis["ticktext"]) >= 1
 
 
+def test_a_log_axis_ends_where_numbers_do() -> None:
+    """The evidence of a change is cut off at 1e304, beyond which there would be room on the axis."""
+    for values in ((1e-2, 1e304), (1e-305, 1.0), (0.5, 1e300, math.inf)):
+        axis = log_axis(*values)
+        assert np.isfinite(axis["range"]).all() and np.isfinite(axis["tickvals"]).all()
+        assert axis["range"][0] <= math.log10(min(values)) < axis["range"][1]
+
+
 def test_a_log_axis_is_that_of_its_positive_values() -> None:
     assert log_axis(0.0, 2.0, 0.5, -1.0) == log_axis(0.5, 2.0)
     assert log_axis(0.0) == log_axis(1.0)
