@@ -157,8 +157,9 @@ def _write_c(
     if flip is not None:
         lines.append(f"directions    told otherwise about a dead band make up to {short(flip)} deg/h")
     if number_of(dtype) == "fixed":
-        proven = fixed_point_error(plan, layout(plan, "fixed"), dtype)
-        lines += fixed_point_lines(proven, plan)
+        windows = layout(plan, "fixed")
+        proven = fixed_point_error(plan, windows, dtype)
+        lines += fixed_point_lines(proven, plan, windows)
     source = c_source(plan, dtype, lines)
     with scratch_folder() as scratch:
         source = source.with_expected(*expected_outputs(source, scratch))

@@ -287,7 +287,7 @@ def _drawn(plan: Plan, scales: Scales, columns: FloatArray) -> tuple[FloatArray,
     return off, moved
 
 
-def fixed_point_lines(proven: float | None, plan: Plan) -> list[str]:
+def fixed_point_lines(proven: float | None, plan: Plan, windows: Layout) -> list[str]:
     """The proven worst case as lines of text."""
     filling = any(atom.window is not None and atom.window.own is not None for atom in plan.atoms)
     if proven is None:
@@ -299,4 +299,9 @@ def fixed_point_lines(proven: float | None, plan: Plan) -> list[str]:
     told = f"worst case    fixed point is at most {short(proven)} deg/h off in the trained box, by proof"
     if plan.gives_rate:
         told += f" of outputs up to {_GYRO_DEG_H:g} deg/h"
-    return [told, "              where its windows of one's own are full"] if filling else [told]
+    lines = [told]
+    if filling:
+        lines.append("              where its windows of one's own are full")
+    if windows.binned:
+        lines.append("              beside what bins of samples make of windows, measured in export.json")
+    return lines

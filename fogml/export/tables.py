@@ -236,8 +236,14 @@ def write_cubics(
     Raises
     ------
     InputError
-        If an axis is none of x, y and z, or a model has a scale factor.
+        If an axis is none of x, y and z, a model has a scale factor, or they are over several thermometers.
     """
+    thermometers = dict.fromkeys("T_in" if c.thermometer == "T" else c.thermometer for c in curves.values())
+    if len(thermometers) > 1:
+        raise InputError(
+            f"export: {to} reads one thermometer for all axes; these models are over "
+            f"{' and '.join(thermometers)}: train them with the same one, or export --to segments"
+        )
     low = max(float(curve.temperature[0]) for curve in curves.values())
     high = min(float(curve.temperature[-1]) for curve in curves.values())
     if not low < high:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -197,7 +199,10 @@ def test_windows_over_bins_stay_within_their_proven_bound(tmp_path, features, ti
     off = np.abs(found["q31"] - found["float64"])[flag == 0].max()
     proven = fixed_point_error(plan, source.layout, "q31")
     assert off <= proven < 100.0 * off
-    assert f"at most {proven:.3g} deg/h" in fixed_point_lines(proven, plan)[0]
+    first, more = fixed_point_lines(proven, plan, source.layout)
+    assert f"at most {proven:.3g} deg/h" in first and "beside what bins of samples make" in more
+    single = fixed_point_lines(proven, plan, c_source(replace(plan, sample_s=2.0), "q31", []).layout)
+    assert single == [first]
 
 
 def test_a_window_that_tells_nothing_yet_is_not_beyond_the_trained_rates():

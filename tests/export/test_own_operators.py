@@ -143,7 +143,7 @@ def test_bins_and_fixed_point_hold_a_window_of_ones_own(tmp_path, sample_s):
         off = np.abs(found[dtype] - found["float64"]).max()
         proven = fixed_point_error(plan, source.layout, dtype)
         assert off <= proven < 30.0 * off
-        first, more = fixed_point_lines(proven, plan)
+        first, more, *_ = fixed_point_lines(proven, plan, source.layout)
         assert f"at most {proven:.3g} deg/h" in first and "are full" in more
 
 
@@ -172,8 +172,9 @@ def test_what_no_rate_is_told_of_has_no_proven_bound():
     late = declare(Kernel("late", (1.0, 1.0, 1.0, 0.0)))
     model = make_model("polynomial", features=f"T_in, dT_in[{late.name}, 4 s]").fit(training_run())
     plan = Plan.of(model)
-    assert fixed_point_error(plan, c_source(plan, "q31", []).layout, "q31") is None
-    assert "not proven" in fixed_point_lines(None, plan)[0]
+    windows = c_source(plan, "q31", []).layout
+    assert fixed_point_error(plan, windows, "q31") is None
+    assert "not proven" in fixed_point_lines(None, plan, windows)[0]
 
 
 def test_what_can_not_be_written_is_named():

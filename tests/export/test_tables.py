@@ -203,6 +203,11 @@ def test_what_does_not_go_together_is_told(axes, tmp_path, model_of):
     (tmp_path / "m.yaml").write_text("[[1, 0], [0, 1]]")
     with pytest.raises(InputError, match="three rows of three numbers"):
         export_tables([x], tmp_path, TableSettings("segments", matrix=tmp_path / "m.yaml"))
+    outer = axes["y"][1]
+    outer = Run("y", {"time": outer.time, "gyro": outer.gyro, "T_out": outer.columns["T"]}, outer.facts)
+    other = make_model("polynomial", features="T_out").fit(outer)
+    with pytest.raises(InputError, match="for all axes; these models are over T_in and T_out"):
+        export_tables([x, other], tmp_path, TableSettings("ardupilot"))
 
 
 @pytest.mark.parametrize("axis", ["roll-1", "*/ int evil;"])
