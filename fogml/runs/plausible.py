@@ -219,7 +219,8 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
     spans = list(pairwise(edges))
     middle = np.array([time[a:b].mean() for a, b in spans])
     for name in names:
-        means = np.array([run.columns[name][a:b].mean() for a, b in spans])
+        # Readings that are none, such as -9999, are few in each part.
+        means = np.array([np.median(run.columns[name][a:b]) for a, b in spans])
         moved, within_s = np.abs(np.diff(means)), np.diff(middle)
         fast = moved > FASTEST_DEGC_PER_MIN / 60.0 * within_s
         if moved[fast].sum() >= FAR_DEGC:

@@ -22,9 +22,10 @@ from fogml.runs.reading_limits import DEFAULT_LIMITS
 from fogml.runs.stamps import stamp_form
 
 _TIME = re.compile(r"time|stamp|clock|zeit|epoch|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
+_COUNT = re.compile(r"sample|index|count|packet|seq|row|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
 _DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
 _GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
-_WARM = re.compile(r"temp|die|oven|therm|^t[_.]?\w{0,3}$|温", re.IGNORECASE)
+_WARM = re.compile(r"temp|die|oven|therm|^t(\w{0,3}|[_.]\w*)$|温", re.IGNORECASE)
 _AXIS = re.compile(r"([xyz])\W*\Z", re.IGNORECASE)
 _UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
 _UNITS = (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
@@ -151,7 +152,8 @@ def _clock(left: list[Field]) -> list[str]:
     # Other columns of the run format, such as a T that grows, are no clocks.
     free = [f for f in left if f.name == "time" or column_spec(f.name) is None]
     named = [f for f in free if f.name == "time" or _TIME.search(f.name) or _DATE.search(f.name)]
-    known = sorted(named, key=lambda f: f.name != "time") or [f for f in free if _grows(f)][:1]
+    growers = [f for f in free if _grows(f) and not _COUNT.search(f.name) and not _is_of_a_run(f)]
+    known = sorted(named, key=lambda f: f.name != "time") or growers[:1]
     growing = [f for f in known if _grows(f) or not f.first]
     growing = growing or [f for f in known if f.unit is not None and is_accepted("time", f.unit)]
     if not growing:
@@ -160,7 +162,8 @@ def _clock(left: list[Field]) -> list[str]:
     left.remove(one)
     if one.unit is not None and is_accepted("time", one.unit):
         return [f"  time: {{source: {as_yaml(one.source)}, unit: {as_yaml(one.unit)}}}"]
-    middle, apart = np.median(one.numbers), np.median(np.diff(one.numbers)) if len(one.first) > 1 else np.nan
+    middle = np.median(one.numbers) if one.first else np.nan
+    apart = np.median(np.diff(one.numbers)) if len(one.first) > 1 else np.nan
     is_date = _DATE.search(f"{one.source} {one.name}") or apart < _LEAST_STEP
     if is_date and any(low < middle < high for low, high in _DAYS):
         why = "days, as a spreadsheet counts them, or datenum"
@@ -215,7 +218,8 @@ def _other(one: Field, face: str | None, used: set[str]) -> str:
     warm = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
     unit = "K" if spec.internal == "degC" and warm > _KELVIN else spec.internal
     entry = f"  {name}: {{source: {as_yaml(one.source)}, unit: {unit}}}"
-    return f"{entry}    {_MARK}which sensor, and is the unit right?"
+    doubt = f", the file says '{one.unit}': state a scale" if one.unit else ", and is the unit right?"
+    return f"{entry}    {_MARK}which sensor{doubt}"
 
 
 def _taken(left: list[Field], is_one: Callable[[Field], bool]) -> list[Field]:

@@ -47,6 +47,10 @@ GIVEN_AWAY = {
     "kelvin": ({"T_in": SOUND["T_in"] + 273.15}, {"implausible_temperature"}),
     "Fahrenheit": ({"T_in": 1.8 * SOUND["T_in"] + 32.0}, {"implausible_temperature"}),
     "raw counts": ({"T_in": 340.0 * (SOUND["T_in"] - 60.0)}, {"implausible_temperature"}),
+    "readings that are none": (
+        {"T_in": np.where(np.arange(ROWS) % 300 == 0, -9999.0, SOUND["T_in"])},
+        {"temperature_dropouts"},
+    ),
     "hours stated as s": ({"time": SOUND["time"] / 3600.0}, {"implausible_clock"}),
     "days of a spreadsheet": ({"time": 45000.0 + SOUND["time"] / 86400.0}, {"implausible_clock"}),
     "a clock that began days ago": ({"time": 45000.0 + SOUND["time"]}, set()),

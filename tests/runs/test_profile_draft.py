@@ -348,3 +348,11 @@ def test_the_first_rows_of_counts_are_in_counts(tmp_path):
     (tmp_path / "log.csv").write_text("time [s],gyro [count]\n" + rows)
     outcome = CliRunner().invoke(app, ["import", str(tmp_path / "log.csv"), "--draft"])
     assert "gyro [count]" in outcome.stdout.partition("the first rows")[2]
+
+
+def test_a_number_of_the_row_is_no_clock_and_a_unit_that_is_not_known_is_told(tmp_path):
+    rows = "".join(f"{i},{7 + i % 3}.5,{20 + i},{20000 + i}\n" for i in range(COUNT))
+    (tmp_path / "log.csv").write_text("Sample,gyro [deg/h],T_inner,T_casing [m°C]\n" + rows)
+    draft = draft_profile(tmp_path / "log.csv")
+    assert "sample_s: 0.01    # GUESS: no clock" in draft and "T_in: {source: T_inner, unit: degC}" in draft
+    assert "GUESS: which sensor, the file says 'm°C': state a scale" in draft
