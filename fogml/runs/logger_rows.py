@@ -34,6 +34,7 @@ from fogml.signals import large
 
 __all__ = [
     "chosen_rows", "internal", "interpolated", "is_held", "joined_columns", "read_logger", "rows_of_leg",
+    "seconds_from_first",
 ]  # fmt: skip
 
 
@@ -154,7 +155,7 @@ def rows_of_leg(table: LoggerTable, profile: ImportProfile, name: str, file: str
     if isinstance(leg, LegByState):
         return matching(table, leg)
     if isinstance(leg, LegByTime):
-        seconds = _seconds(table, profile)
+        seconds = seconds_from_first(table, profile)
         return (seconds >= leg.from_s) & (seconds < leg.to_s)
     first, end = leg
     if end > table.total_rows:
@@ -165,7 +166,7 @@ def rows_of_leg(table: LoggerTable, profile: ImportProfile, name: str, file: str
     return (table.rows >= first) & (table.rows < end)
 
 
-def _seconds(table: LoggerTable, profile: ImportProfile) -> FloatArray:
+def seconds_from_first(table: LoggerTable, profile: ImportProfile) -> FloatArray:
     """Time of each row since the first [s]."""
     if table.seconds is not None:
         return table.seconds - table.seconds[:1]

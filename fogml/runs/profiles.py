@@ -24,6 +24,7 @@ from fogml.runs.logger_rows import (
     joined_columns,
     read_logger,
     rows_of_leg,
+    seconds_from_first,
 )
 from fogml.runs.logger_text import LoggerTable
 from fogml.runs.other_rate import held_beyond
@@ -151,10 +152,15 @@ def runs_from_table(
                 what = "the profile rejects them all" if leg is None else f"no row is of the leg '{leg}'"
                 raise InputError(f"{file}: no rows are left; {what}")
             findings = [*table.findings, *found]
+            own = _facts(profile, this_axis, facts, table)
+            if leg is not None and own.powered_on is not None:
+                # It is told on the clock of the recording, of which the leg is a part.
+                later = float(seconds_from_first(table, profile)[part][0])
+                own = own.model_copy(update={"powered_on": own.powered_on - later})
             runs += runs_of_columns(
                 _columns(table, part, profile, this_axis, file, joined, findings),
                 Rows(file, lambda i, rows=rows: f"data row {int(rows[i]) + 1}"),  # type: ignore[misc]
-                _with_losses(_facts(profile, this_axis, facts, table), findings, len(rows), most_dropped),
+                _with_losses(own, findings, len(rows), most_dropped),
                 name,
                 gyro_unit="count" if profile.columns["gyro"].unit == "count" else "deg/h",
                 tick_s=_tick_s(profile),

@@ -284,3 +284,14 @@ def test_a_column_of_another_rate_that_ends_early_is_said(tmp_path):
     (tmp_path / "run.csv").write_text("time [s],gyro [deg/h],T [degC]\n" + rows)
     (told,) = (f.message for f in read_run(tmp_path / "run.csv").findings if f.code == "held_beyond")
     assert told.startswith("'T' is not known 54.0 s after its last:")
+
+
+@pytest.mark.parametrize("clock", ["time: {source: t, unit: s}", "time: {source: s, unit: stamp}"])
+def test_a_leg_was_switched_on_with_its_recording(read, clock):
+    text = "t,s,w\n" + "".join(f"{500 + i},08:00:{i:02d},{7 + i % 3}.5\n" for i in range(40))
+    profile = (
+        "schema: fogml.import/1\ndescription: a bench\ncolumns:\n  gyro: {source: w, unit: deg/h}\n"
+        f"  {clock}\n"
+        "legs: {a: [0, 10], b: [10, 40]}\nfacts: {powered_on: -5.0}\n"
+    )
+    assert [run.facts.powered_on for run in read(profile, text)] == [-5.0, -15.0]
