@@ -42,8 +42,11 @@ def multipoint_form(sensors: Sequence[str], order: int, rate_order: int) -> str:
     rate_order
         Highest power of each rate; 0 leaves rates out.
     """
-    if not sensors or order < 1 or rate_order < 0:
-        raise InputError("a multi-point form needs a sensor, an order of at least 1 and a rate order of 0 up")
+    whole = all(isinstance(one, int | np.integer) for one in (order, rate_order))
+    if not sensors or not whole or order < 1 or rate_order < 0:
+        raise InputError(
+            "a multi-point form needs a sensor, a whole order of at least 1, a rate order of 0 up"
+        )
     terms = []
     for sensor in sensors:
         terms.append(f"{sensor}^1..{order}" if order > 1 else sensor)

@@ -118,8 +118,10 @@ def two_step(turning: Run, rest: Run | None = None, *, order: int = 2, one_sense
     Raises
     ------
     InputError
-        If the table never turns, or the bias can't be fitted.
+        If the table never turns, the bias can't be fitted, or the order is no whole number from 0 on.
     """
+    if not isinstance(order, int | np.integer) or order < 0:
+        raise InputError(f"order {order} of the scale factor: a whole number from 0 on is needed")
     found = scale_factors(turning, one_sense)
     degree = min(order, len(np.unique(found.temperature)) - 1)
     span = float(found.temperature.min()), float(found.temperature.max())

@@ -95,6 +95,8 @@ def constant_drift(
 ) -> NavigationError:
     """Errors after given times under a constant drift [deg/h], in closed form (a matrix exponential each)."""
     times = 3600.0 * np.atleast_1d(np.asarray(hours, dtype=np.float64))
+    if not (np.isfinite(drift_deg_h) and np.all((times >= 0.0) & np.isfinite(times))):
+        raise InputError("drift and hours: finite numbers, and times from 0 on, are needed")
     f, b = error_matrices(latitude_deg, axis)
     scale = _scale()
     # The eighth state is the drift itself, held at its value.

@@ -106,8 +106,7 @@ class Scheme:
 
     def __post_init__(self) -> None:
         check_sense(self.sense)
-        if not np.all(np.isfinite(self.order_deg)):
-            raise InputError(f"order {self.order_deg}: finite angles in deg are needed")
+        _check_angles(self.order_deg)
         if not (np.isfinite(self.dwell_s) and self.dwell_s > 0.0):
             raise InputError(f"dwell {self.dwell_s:g} s: a time above 0 is needed")
         if not (np.isfinite(self.transfer_s) and self.transfer_s >= 0.0):
@@ -258,11 +257,17 @@ def design_matrix(
 ) -> FloatArray:
     """Columns cos(a), -s sin(a), 1 and, where times are given, hours from their mean, shape (m, 3 or 4)."""
     check_sense(sense)
+    _check_angles(angles_deg)
     angles = np.radians(np.asarray(angles_deg, dtype=np.float64))
     columns = [np.cos(angles), -SENSES[sense] * np.sin(angles), np.ones_like(angles)]
     if times_s is not None:
         columns.append((times_s - np.mean(times_s)) / 3600.0)
     return np.column_stack(columns)
+
+
+def _check_angles(angles_deg: Sequence[float] | FloatArray) -> None:
+    if not np.all(np.isfinite(angles_deg)):
+        raise InputError(f"order {tuple(angles_deg)}: finite angles in deg are needed")
 
 
 def check_design(design: FloatArray, observes_drift: bool) -> None:

@@ -206,6 +206,8 @@ def _recorded_positions(run: Run, order_deg: Sequence[float], sense: str, tolera
             f"{run.name}: no column 'position', 1 to {len(order_deg)} in a position and 0 on the way, and no "
             "column 'angle [deg]' of the table that would tell it; one of them is needed"
         )
+    if not 0.0 < tolerance_deg < 180.0:
+        raise InputError(f"tolerance of the table's angle {tolerance_deg:g} deg: 0 to 180 deg is needed")
     # The table's angle counts counter-clockwise.
     turned = run.columns["angle"] * (-1.0 if sense == "cw" else 1.0)
     off = wrapped(turned[:, None] - np.asarray(order_deg, dtype=np.float64))

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
+from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.runs.settling import LEAST_ROWS, error_of_mean, settling_rows
 from fogml.runs.turning import white_noise
@@ -90,7 +91,14 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
     settle_s
         Left out at the begin of each but the first [s]; if None as long as outputs of all plateaus together
         show that gyro and table have not settled, half of a plateau at most.
+
+    Raises
+    ------
+    InputError
+        If that is no time.
     """
+    if settle_s is not None and not 0.0 <= settle_s < np.inf:
+        raise InputError(f"settle {settle_s:g} s: a time that is not negative is needed")
     time, rate, output = run.time, run.rate, run.gyro_deg_h
     turning = np.zeros(len(rate), dtype=np.bool_)
     for wave in waves:

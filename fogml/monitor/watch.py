@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import listed
+from fogml.errors import InputError, listed
 from fogml.intervals import TAILS
 from fogml.monitor.changes import Chart, Shape, change_chart
 from fogml.monitor.evidence import ChangePrior, flicker_covariance
@@ -185,7 +185,14 @@ def watch(
         90 % interval inside training.
     prior
         What is taken for granted of changes.
+
+    Raises
+    ------
+    InputError
+        If the limit is no positive number, or the number of runs is below 1.
     """
+    if bias_limit is not None and not 0.0 < bias_limit < np.inf:
+        raise InputError(f"bias limit {bias_limit:g} deg/h: a positive number is needed")
     ordered = sorted(records, key=lambda record: (record.unit, record.axis))
     return [
         _watched(list(group), runs_between_false_alarms, bias_limit, prior or ChangePrior())

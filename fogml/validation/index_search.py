@@ -24,6 +24,7 @@ from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.signals.averages import AVERAGING_S, block_averages
 from fogml.validation.floors import floor_of_run, out_of_reach
+from fogml.validation.limits import check_design_index
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -157,8 +158,9 @@ def train_until_index(
     Raises
     ------
     InputError
-        If no candidate can be fitted, or the parameters are none of the model's.
+        If no candidate can be fitted, the parameters are none of the model's, or the index is not positive.
     """
+    check_design_index(design_index)
     group = runs_of(runs)
     asked = Candidate(model, features, parameters=parameters)
     if parameters:
