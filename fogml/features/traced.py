@@ -176,7 +176,7 @@ def decayed(u: Any) -> Any:
 
 
 def forgotten(u: Any) -> Any:
-    """1 - exp(-u), exact to the format's own digits however small u is; for u of 0 to 8."""
+    """1 - exp(-u), exact to the format's own digits however small u is; for u of 0 or more."""
     return u.writer.call("forgotten_share", None, u) if isinstance(u, Symbol) else -np.expm1(-u)
 
 

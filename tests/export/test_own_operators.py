@@ -17,7 +17,7 @@ from fogml.features import own
 from fogml.features.operators import LAG, PLAY
 from fogml.features.own import Function, Recursion, RecursionOperator, declare
 from fogml.features.parse import parse_features
-from fogml.features.traced import larger, smaller, where
+from fogml.features.traced import forgotten, larger, smaller, where
 from fogml.models.names import make_model
 from fogml.runs.run import Run
 from fogml.signals.clock import Clock
@@ -50,6 +50,18 @@ PEAK = Recursion(
     value=lambda s, x: s[0],
     settled=lambda s, x: s[0] - s[1] > 5.0,
     gain=1.0,
+)
+TWO_TIMES = Recursion(
+    name="two_times",
+    parameters=("s", "s"),
+    start=lambda x, slow, fast: (x, x),
+    step=lambda s, x, last, dt, slow, fast: (
+        s[0] + forgotten(dt / slow) * (x - s[0]),
+        s[1] + forgotten(dt / fast) * (x - s[1]),
+    ),
+    value=lambda s, x, slow, fast: s[0] - s[1],
+    time_constant=0,
+    gain=2.0,
 )
 OPERATORS = "T_in, bend(T_in, 30 degC, 2), fold(T_out, 15 degC), creep(T_in-T_out, 300 s), peak(T_out)"
 TEXT = f"{OPERATORS}, dT_in[hann, 60 s], diff(T_out)[line, 40 s]"
@@ -113,6 +125,23 @@ def test_their_c_gives_what_compensate_gives(tmp_path, text, dtype, bound):
     np.testing.assert_allclose(out, expected.compensated, atol=bound)
     assert np.count_nonzero(flag[1:] != expected.flag[1:]) <= (0 if dtype == "float64" else 2)
     assert set(flag.tolist()) == {1, 2}  # never as slow as in training
+
+
+@needs_cc
+@pytest.mark.parametrize(("dtype", "bound"), [("float64", 1e-9), ("float32", 1e-5), ("q31", 1e-3)])
+def test_a_gap_may_be_many_of_an_operators_shorter_times(tmp_path, dtype, bound):
+    """Gaps of 22, 40 and 67 times 3 s, none of which the longer time ends."""
+    declare(TWO_TIMES)
+    model = make_model("polynomial", features="T_in, two_times(T_in, 900 s, 3 s)").fit(training_run())
+    source = c_source(Plan.of(model), dtype, [])
+    time = np.arange(0.0, 6000.0, 2.0)
+    keep = (np.abs(time - 4500.0) > 33.0) & (np.abs(time - 5000.0) > 60.0) & (np.abs(time - 5500.0) > 100.0)
+    T = 20.0 + 15.0 * np.sin(time / 900.0)
+    run = Run("gaps", {"time": time, "gyro": np.zeros(len(T)), "T_in": T, "T_out": T})[keep]
+    out, flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
+    expected = model.compensate(run)
+    assert set(flag[run.time > 4000.0].tolist()) <= {0, 1}
+    np.testing.assert_allclose(out, expected.compensated, atol=bound)
 
 
 @needs_cc
