@@ -8,6 +8,7 @@ import mimetypes
 import tempfile
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -220,6 +221,7 @@ class _Upload(_Handler):
     """A file as it comes, on disk rather than in memory, and never more than allowed."""
 
     partial: Path | None = None
+    fault = ""
 
     def prepare(self) -> None:
         super().prepare()
@@ -227,8 +229,7 @@ class _Upload(_Handler):
             return
         assert isinstance(self.request.connection, HTTP1Connection)
         self.request.connection.set_max_body_size(self.app.limits.upload_bytes)
-        told = int(self.request.headers.get("Content-Length", 0))
-        if told > self.app.limits.upload_bytes:
+        if int(self.request.headers.get("Content-Length", 0)) > self.app.limits.upload_bytes:
             raise HTTPError(413, f"the file is larger than {self.app.limits.upload_bytes / 1e6:g} MB allowed")
         try:
             self.app.files.place(self.path_args[0])
@@ -241,13 +242,18 @@ class _Upload(_Handler):
 
     def data_received(self, chunk: bytes) -> None:
         if self.partial is None:
-            return  # of another method than PUT
+            return  # of another method than PUT, or of a file that is given up
         try:
             self._file.write(chunk)
+            self._file.flush()
         except OSError as error:
-            raise HTTPError(507, f"the file cannot be kept: {error.strerror}") from None
+            # Told once all has come: before, the connection would end without a word.
+            self.fault = f"the file cannot be kept: {error.strerror}; make room and drop it again"
+            self._drop()
 
     def put(self, name: str) -> None:
+        if self.fault:
+            raise HTTPError(507, self.fault)
         self._file.close()
         assert self.partial is not None
         partial, self.partial = self.partial, None
@@ -273,7 +279,8 @@ class _Upload(_Handler):
     def _drop(self) -> None:
         """Remove what came of an upload that ended before its end."""
         if self.partial is not None:
-            self._file.close()
+            with suppress(OSError):  # of a full disk, which the rest of it does not fit on
+                self._file.close()
             self.partial.unlink(missing_ok=True)
             self.partial = None
 
@@ -294,8 +301,7 @@ class _Result(_Handler):
         if place.suffix == ".html":
             self.set_header("Content-Type", "text/html; charset=utf-8")
         else:
-            kind = mimetypes.guess_type(place.name)[0] or "application/octet-stream"
-            self.set_header("Content-Type", kind)
+            self.set_header("Content-Type", mimetypes.guess_type(place.name)[0] or "application/octet-stream")
             self.set_header("Content-Disposition", "attachment")
         self.set_header("Content-Length", str(place.stat().st_size))
         with open(place, "rb") as file:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import resource
 import socket
 from urllib.parse import quote
 
@@ -87,6 +88,15 @@ def test_uploads_are_bounded_whole_and_never_overwritten(app):
         app.ask("GET", "/api/state")
     assert [(p.name, p.read_bytes()) for p in (app.folder / "files").iterdir()] == [("kept.csv", b"first")]
     assert app.ask("DELETE", "/api/files/nothing.csv")[0] == 404
+
+
+def test_an_upload_that_does_not_fit_is_told_and_leaves_nothing(tmp_path):
+    app = Running(tmp_path / "lab")
+    resource.prlimit(app.process.pid, resource.RLIMIT_FSIZE, (1 << 16, 1 << 16))
+    status, text, _ = app.ask("PUT", "/api/files/large.csv", b"x" * (1 << 20))
+    assert status == 507 and "cannot be kept: File too large; make room" in text
+    assert not list((tmp_path / "lab" / "files").iterdir())
+    app.kill()
 
 
 def test_results_are_pages_of_an_origin_of_their_own_and_nothing_else_is_given(app):
