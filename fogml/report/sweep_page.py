@@ -164,13 +164,15 @@ def sweep_page(study: Mapping[str, Any], judgement: Judgement | None = None) -> 
 def standing(winner: Mapping[str, Any]) -> list[str]:
     """Sentences that say first that nothing beats the default, and what the winner is worse than on the
     parts held out."""
+    # Worse by less than the digits told is no difference.
+    left = number(winner.get("bias_stability"))
     stays = "No trial beats the default polynomial beyond noise on the parts held out: it stays the winner."
     return [stays] * (winner.get("reference") == DEFAULT) + [
         f"The winner is worse than {against['reference']} on the parts held out: "
-        f"{number(winner['bias_stability'])} against {number(against['bias_stability'])} deg/h about each "
+        f"{left} against {number(against['bias_stability'])} deg/h about each "
         f"run's mean, {'beyond' if against['beyond_noise'] else 'within'} noise."
         for against in winner.get("against", [])
-        if against["winner_worse"]
+        if against["winner_worse"] and number(against["bias_stability"]) != left
     ]
 
 

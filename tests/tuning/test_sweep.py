@@ -265,6 +265,8 @@ def test_the_default_and_autos_choice_are_tried_first(tmp_path):
     told = against_references(trials, worst)
     assert all(one["winner_worse"] and one["beyond_noise"] for one in told)
     assert "worse than default" in standing({"bias_stability": 1.0, "against": told})[0]
+    alike = [{**told[0], "bias_stability": 0.41721, "winner_worse": True}]
+    assert standing({"bias_stability": 0.41724, "against": alike}) == []
     # What `auto` made, here the default's form and nothing beside, is judged as it would be used, and
     # `fogml train` is told to make it again.
     auto = next(trial for trial in trials if trial.user_attrs.get("reference") == "auto")
