@@ -23,6 +23,7 @@ from fogml.export.c_program import (
     cortex_m4_size,
     cortex_m4_state_bytes,
     instructions_per_sample,
+    write_files,
 )
 from fogml.export.c_source import c_source
 from fogml.export.check import c_difference, expected_outputs
@@ -638,3 +639,12 @@ def test_what_a_direction_makes_that_is_told_otherwise_is_stated(tmp_path):
     # Of the hottest or coldest temperature, as the coefficient is per degC.
     ends = np.abs(model.features_.box["T_in"]).max()
     assert flip == pytest.approx(abs(source.plan.arrays["linear"][2]) * ends, rel=0.01)
+
+
+@pytest.mark.parametrize(("dtype", "compiles"), [("float64", False), ("float32", True), ("q31", True)])
+def test_a_double_of_32_bits_is_none(model_of, tmp_path, dtype, compiles):
+    """As of Arduinos with an AVR, where the Gaussians of a network come out as 0."""
+    write_files(c_source(Plan.of(model_of("rbf")), dtype, []).files, tmp_path)
+    words = ["gcc", "-U__SIZEOF_DOUBLE__", "-D__SIZEOF_DOUBLE__=4", "-fsyntax-only"]
+    done = subprocess.run([*words, str(tmp_path / "fogml_model.c")], capture_output=True, text=True)
+    assert (done.returncode == 0) == compiles == ("no float64" not in done.stderr)
