@@ -4,13 +4,42 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import shutil
 import sys
+import unicodedata
 from pathlib import Path
 
 from fogml.errors import printable
 
 _AT_CWD, _RENAME_EXCHANGE = -100, 2  # of Linux
+_UNSAFE = re.compile(r"[^\w.+-]+")
+
+
+def safe_name(text: str, mark: str, longest_bytes: int) -> str:
+    """What a file or folder may be called on any system: letters and digits of any script, and ``_.+-``.
+
+    Parameters
+    ----------
+    text
+        A name, such as a unit's.
+    mark
+        What stands for other characters.
+    longest_bytes
+        How much of it is kept at most [bytes of UTF-8].
+
+    Examples
+    --------
+    >>> safe_name("陀螺 7/b", "_", 100)
+    '陀螺_7_b'
+    """
+    text = unicodedata.normalize("NFC", text)
+    try:
+        os.fsencode(text)
+    except UnicodeEncodeError:  # of a system whose files have no such names
+        text = re.sub(r"[^\x00-\x7f]", "/", text)
+    plain = _UNSAFE.sub(mark, text).strip(".") or "unit"
+    return plain.encode()[:longest_bytes].decode(errors="ignore")
 
 
 def with_slashes(path: str | Path, *folders: Path) -> str:

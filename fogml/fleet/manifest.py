@@ -12,20 +12,19 @@ from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError, known_are, quoted
-from fogml.folders import with_slashes
+from fogml.folders import safe_name, with_slashes
 from fogml.runs.csv_dialect import text_of
 from fogml.yaml_text import read_yaml
 
 MANIFEST_SCHEMA = "fogml.manifest/1"
 _LONGEST_FOLDER = 100
-"""Characters of a unit's folder: names of files may have 255 bytes, and some stand beside it."""
+"""Bytes of a unit's folder: names of files may have 255 bytes, and some stand beside it."""
 COLUMNS = ("unit", "job", "train", "test", "axis")
 COVARIATE = "covariate:"
 """What the names of columns begin with that state a number or a label of a unit's production."""
 JOBS = ("train", "compare", "diagnose", "acceptance")
 SHIPPED = "shipped:"
 _COVARIATE_NAME = re.compile(COVARIATE + r"[A-Za-z0-9_ -]+")
-_UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
 _FILE = re.compile(r"\.(json|html|xlsx|yaml)$", re.IGNORECASE)
 # How files end that stand beside the units' folders.
 
@@ -224,13 +223,12 @@ def folder_names(units: Sequence[str]) -> list[str]:
     placed: list[str] = []
     taken: set[str] = set()
     for unit in units:
-        wanted = (_UNSAFE.sub("_", unit).strip(".") or "unit")[:_LONGEST_FOLDER]
-        wanted = _FILE.sub(r"_\1", wanted)
+        wanted = _FILE.sub(r"_\1", safe_name(unit, "_", _LONGEST_FOLDER))
         folder, number = wanted, 1
         # Names that differ only in case are one folder on some systems.
-        while folder.lower() in taken:
+        while folder.casefold() in taken:
             number += 1
             folder = f"{wanted}-{number}"
-        taken.add(folder.lower())
+        taken.add(folder.casefold())
         placed.append(folder)
     return placed

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Mapping
 from typing import Any
 
 from fogml.fleet.summary import label_of
+from fogml.folders import safe_name
 from fogml.numerals import in_order_of_serial, number, percent, plural
 from fogml.report.monitor_words import (
     FIGURE_WORDS,
@@ -23,14 +23,12 @@ from fogml.report.monitor_words import (
 from fogml.report.page import Tile, render
 from fogml.report.tables import Table
 
-_UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
-
 
 def unit_file(unit: Mapping[str, Any]) -> str:
     """Name of a unit's page, unlike every other's."""
     label = label_of(unit)
     digest = hashlib.sha256(f"{unit['unit']}\0{unit['axis']}".encode()).hexdigest()[:8]
-    return f"{_UNSAFE.sub('-', label)[:80].strip('-.') or 'unit'}-{digest}.html"
+    return f"{safe_name(label, '-', 80).strip('-.')}-{digest}.html"
 
 
 def monitor_page(monitor: Mapping[str, Any]) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 import yaml
 
 from fogml.errors import InputError
-from fogml.fleet.manifest import read_manifest
+from fogml.fleet.manifest import folder_names, read_manifest
 
 HEAD = "unit,job,train,test,axis\n"
 
@@ -67,6 +69,21 @@ def test_folders_are_safe_and_unlike_each_other(folder):
     assert len(set(names)) == len(names)
     assert not any("/" in name or name.startswith(".") or len(name) > 110 for name in names)
     assert not {"fleet.json", "batch.xlsx"} & set(names)  # files of the fleet's own
+
+
+def test_folders_have_the_units_own_names_in_any_script(folder, monkeypatch):
+    given = ["陀螺仪-07", "陀螺仪-08", "Kreisel 8/ä", "Kreisel 8/a\u0308", "STRASSE", "straße", "光" * 80]
+    names = folder_names(given)
+    assert names[:4] == ["陀螺仪-07", "陀螺仪-08", "Kreisel_8_ä", "Kreisel_8_ä-2"]
+    assert names[5:] == ["straße-2", "光" * 33]  # 100 bytes hold 33 of them
+    for name in names:
+        (folder / name).mkdir()
+
+    def latin(name: str) -> bytes:
+        return name.encode("latin-1")
+
+    monkeypatch.setattr(os, "fsencode", latin)
+    assert folder_names(given[:3]) == ["_-07", "_-08", "Kreisel_8_ä"]
 
 
 def test_a_list_is_no_name(folder):
