@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.turning import white_noise
 from fogml.signals import large
+from fogml.signals.averages import window_numbers
 from fogml.signals.clock import GAP_TOLERANCE, gap_starts
 
 SETTLED_DEGC_MIN = 0.05
@@ -149,7 +150,7 @@ def _grid(time: FloatArray, sample_s: float, bin_s: float) -> Grid:
     cuts = gap_starts(time, sample_s, max(LONGEST_BRIDGE_S, 10.0 * sample_s) + GAP_TOLERANCE * sample_s)
     begins = [cuts]
     for rows in large.pieces(time, overlap=1):
-        number = np.floor((time[rows] - time[0]) / bin_s * (1.0 + 1e-12))
+        number = window_numbers(time[rows], time[0], sample_s, bin_s)
         begins.append(rows.start + np.flatnonzero(np.diff(number) > 0) + 1)
     starts = np.union1d([0], np.concatenate(begins)).astype(np.intp)
     first = np.concatenate([[0], cuts])

@@ -190,7 +190,7 @@ def test_train_again_searches_on_training_folds(invoke_json, invoke, run_files, 
         (("a.csv", "a.csv", "--test", "b.csv"), "more than once"),
         (("a.csv", "--test", "none.csv"), "none.csv"),
         (("a.csv", "--test", "shipped:nothing"), "no such recording"),
-        (("a.csv", "--test", "b.csv", "-o", "a.csv"), "is a file"),
+        (("a.csv", "--test", "b.csv", "-o", "a.csv"), "is itself read"),
         (("a.csv", "--test", "b.csv", "-o", "a.csv/out"), "a.csv"),
     ],
 )

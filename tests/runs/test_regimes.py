@@ -230,6 +230,21 @@ def test_turning_is_where_the_table_turns(noise):
     assert np.array_equal(found.mask("turning"), table != 0.0)
 
 
+@pytest.mark.parametrize("sample_s", [1.3, 3.7, 7.3])
+def test_regimes_are_the_same_on_a_clock_of_the_epoch(sample_s):
+    """Times near 1.7e9 s are told to 0.2 us, so that a sample may fall short of its bin's begin."""
+    time = sample_s * np.arange(int(14400 / sample_s))
+    chamber = np.interp(time, [0, 2400, 5100, 7800, 10500], [25, 25, 60, 60, -20])
+    gain = 1.0 - np.exp(-sample_s / 400.0)
+    coil = lfilter([gain], [1.0, gain - 1.0], chamber - 25.0) + 25.0
+    read = np.round(128.0 * (coil + 0.003 * np.random.default_rng(0).normal(size=len(time)))) / 128.0
+    labels = [
+        regimes(Run("run", {"time": start + time, "gyro": np.zeros(len(time)), "T": read})).labels
+        for start in (0.0, 1.7e9)
+    ]
+    assert np.array_equal(*labels)
+
+
 def test_the_thermal_cycle():
     share = {}
     for leg, name in ((1, "ramp_down"), (2, "ramp_up"), (3, "ramp_down")):

@@ -68,6 +68,14 @@ def test_average_is_the_mean_of_the_samples_in_its_window(window: float, time: F
         assert found[row] == pytest.approx(output[inside].mean(), abs=1e-12)
 
 
+def test_an_average_is_the_same_on_a_clock_of_the_epoch() -> None:
+    """Times near 1.7e9 s are told to 0.2 us: a window's edge is no sharper."""
+    time = 0.7 * np.arange(4000.0)
+    output = wave(time)
+    plain, late = (logger("averaging").record(output, inputs(start + time), 7.0) for start in (0.0, 1.7e9))
+    assert late == pytest.approx(plain, abs=1e-9)
+
+
 @pytest.mark.parametrize("count", [1, 4, 16])
 def test_averaging_lowers_white_noise_by_the_root_of_its_samples(count: int) -> None:
     """A window of one sample changes nothing: samples are means already."""

@@ -107,7 +107,8 @@ class Averaging(LoggerEffect):
         total = np.concatenate([[0.0], np.cumsum(held - held[0])])
         stop = np.arange(len(time) - len(output), len(time)) + 1
         # A sample as old as the window has just left it, but for the clock's rounding.
-        first = np.searchsorted(time, inputs.time - amplitude * (1.0 - 1e-9), side="left")
+        left = inputs.time - amplitude * (1.0 - 1e-9) + 2.0 * np.spacing(np.abs(inputs.time))
+        first = np.searchsorted(time, left, side="left")
         first = np.minimum(first, stop - 1)
         mean = held[0] + (total[stop] - total[first]) / (stop - first)
         return np.where(stop - first == 1, output, mean)
