@@ -26,6 +26,8 @@ from fogml.twin.truth import Truth
 from fogml.twin.twin import RATE_WINDOW_S, EffectSetting, Twin
 
 _CACHE_BYTES = 256_000_000
+_LONGEST_ON_S = 1e8
+"""No unit has been on, and no clock with it, for three years [s]: later times are dates."""
 QUIET_DEGC = 2.5e-4
 """Readings with less noise give their rates from neighbour to neighbour, as true nodes do."""
 
@@ -95,11 +97,17 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
         drives=drives,
         sensors=sensors,
         rate_window_s=RATE_WINDOW_S if noisy else 0.0,
-        epoch_s=run.facts.epoch_s,
+        epoch_s=run.facts.epoch_s - dates_s(run),
         angle_begins_anew="angle" in drives and float(np.ptp(drives["angle"])) <= 360.0,
         hindsight=noisy,
     )
     return inputs, windows
+
+
+def dates_s(run: Run) -> float:
+    """Time of a run's first sample where its clock tells dates, as seconds since 1970 do, else 0 [s]."""
+    first = float(run.time[0])
+    return first if first > _LONGEST_ON_S else 0.0
 
 
 def _with_table_axis(run: Run) -> Facts:
@@ -128,7 +136,7 @@ def inputs_of_truth(truth: Truth, run: Run) -> Inputs:
         power_offs_s=tuple(off for _, off in windows[:-1]),
         drives=truth.drives,
         rate_window_s=0.0,
-        epoch_s=run.facts.epoch_s,
+        epoch_s=run.facts.epoch_s - dates_s(run),
     )
 
 

@@ -20,7 +20,7 @@ from fogml.twin.plant.estimate import EstimateState, estimate_nodes
 from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.plant.network import PlantState, ThermalNetwork
 from fogml.twin.recorder import chosen, logged
-from fogml.twin.replay import Replayer
+from fogml.twin.replay import Replayer, dates_s
 from fogml.twin.twin import EffectSetting, Twin
 
 _ROWS = 600
@@ -186,16 +186,17 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
     ended, network = 0.0, twin.network
     for number, one in enumerate(runs):
         replayer = Replayer(one)
-        clock = later_s(one.facts, runs[0].facts, one.name)
+        begins = later_s(one.facts, runs[0].facts, one.name)
+        clock = begins - dates_s(one)
         given = replayer.surrounded(twin, replayer.recorded)
         time = clock + given.time
         own = tuple((on + clock, off + clock) for on, off in replayer.windows)
         if number:
             if time[0] < ended - START_SLACK * _step(one):
                 raise InputError(f"{one.name}: it starts before {runs[number - 1].name} has ended")
-            windows = windows_with_history(windows, own, clock, ended, storage)
+            windows = windows_with_history(windows, own, begins, ended, storage)
             assert left is not None
-            between = storage_times(ended, clock)
+            between = storage_times(ended, begins)
             if len(between):
                 state = plant_state(network, float(parts[-1][0][-1]), left)
                 nodes = stored_nodes(network, between, storage, windows, state)

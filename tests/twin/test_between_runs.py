@@ -158,6 +158,24 @@ def test_a_unit_ages_from_its_first_run_on_whichever_run_is_replayed() -> None:
     assert replay(twin, used, only="ageing") == pytest.approx(wanted, rel=1e-9)
 
 
+@pytest.mark.parametrize("id", ["ageing", "warmup_bias", "stress_relaxation", "hidden_thermal_node"])
+def test_a_clock_of_dates_is_one_that_begins_with_the_run(id: str) -> None:
+    """As loggers write: seconds since 1970."""
+    twin = unit(id)
+    first = simulate(RAMP, twin, sample_s=10.0, facts=facts())
+    runs = [first.run, simulate(DOWN, twin, sample_s=10.0, facts=facts(30.0), after=first).run]
+    dated = []
+    for run in runs:
+        begun, on = run.facts.started.timestamp(), run.facts.powered_on
+        own = run.facts.model_copy(update={"powered_on": None if on is None else begun + on})
+        dated.append(Run(run.name, {**run.columns, "time": begun + run.time}, own))
+    for after in ((), (0,)):
+        wanted = replay_after(twin, runs[1], [runs[i] for i in after], only=id)
+        found = replay_after(twin, dated[1], [dated[i] for i in after], only=id)
+        np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())
+    np.testing.assert_allclose(replay(twin, dated[1]), replay(twin, runs[1]), rtol=1e-6, atol=1e-6)
+
+
 def test_a_diagnosis_knows_the_time_between_its_runs() -> None:
     twin = unit().with_effect("ageing", 1.0, time_constant=360_000.0)
     runs = [simulate(DOWN, unit(), sample_s=60.0, facts=facts(hours)).run for hours in (700.0, 0.0, 24.0)]
