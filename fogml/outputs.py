@@ -20,7 +20,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
-from fogml.errors import FogmlError, InputError, listed
+from fogml.errors import FogmlError, InputError, listed, printable
 from fogml.folders import exchange_whole, has_to_stay, is_folder, nearest_folder
 from fogml.locks import NO_ROOM, FileLock, remove_left_locks, sole_writer, unwritable
 
@@ -81,6 +81,30 @@ def check_is_no_folder(path: Path) -> None:
         raise InputError(f"{path}: is a folder, a file was expected; choose another name")
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is no ordinary file; choose another name")
+
+
+def check_room(path: Path, least_bytes: float, what: str, remedy: str) -> None:
+    """Refuse an output that no disk room is left for, before hours are spent on it.
+
+    Parameters
+    ----------
+    path
+        Where it goes.
+    least_bytes
+        What it takes at the very least.
+    what, remedy
+        What it would hold, and what would make it smaller.
+
+    Raises
+    ------
+    InputError
+        With what is free.
+    """
+    free = shutil.disk_usage(nearest_folder(path.absolute().parent)).free
+    if least_bytes > free:
+        raise InputError(
+            f"{printable(str(path))}: {what} do not fit into the {free / 1e9:.3g} GB free; {remedy}"
+        )
 
 
 @contextmanager

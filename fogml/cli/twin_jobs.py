@@ -17,6 +17,7 @@ from fogml.cli.twin_commands import ReplaySettings, SimulateSettings
 from fogml.errors import InputError
 from fogml.json_files import check_finite
 from fogml.numerals import duration, number
+from fogml.outputs import check_room
 from fogml.runs.columns import REPLAYED
 from fogml.runs.facts import facts_from
 from fogml.runs.other_rate import at_times_of, is_simulator_output, read_gnss_ins_sim
@@ -63,9 +64,16 @@ def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
             facts,
             truth=settings.truth is not None,
         )
-        with terminal.work(f"simulating {programme.name}", total=len(world.timeline)) as work:
-            rows = write_world(world, out, settings.truth, work.advance)
+        rows = _simulate_into(out, world, settings.truth, terminal)
     _print_simulation(settings, world, rows, terminal)
+
+
+def _simulate_into(out: Path, world: World, truth: str | None, terminal: Terminal) -> int:
+    samples = len(world.timeline)
+    # No format holds a sample in less than a byte.
+    check_room(out, float(samples), f"{samples:.3g} samples", "state a longer --sample")
+    with terminal.work(f"simulating {world.timeline.programme.name}", total=samples) as work:
+        return write_world(world, out, truth, work.advance)
 
 
 def _simulate_draws(settings: SimulateSettings, terminal: Terminal) -> None:
@@ -139,8 +147,7 @@ def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
                 before=before,
                 storage=storage,
             )
-            with terminal.work(f"simulating {programme.name}", total=len(before.timeline)) as work:
-                rows = write_world(before, out, run.truth, work.advance)
+            rows = _simulate_into(out, before, run.truth, terminal)
             terminal.say(f"{rows} samples of {programme.name}, started {run.started}, written to {out}")
             _say_silent(before, terminal)
             results.append(

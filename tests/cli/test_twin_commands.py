@@ -133,6 +133,7 @@ def test_files_lie_beside_the_configuration(config, tmp_path, invoke, monkeypatc
         ({"columns": ["T_hub"]}, "'T_hub' can't be recorded"),
         ({"schema": "fogml.simulate/2"}, "fogml.simulate/1"),
         ({"sample_s": -1}, "'sample_s' is -1"),
+        ({"sample_s": 1e-12}, "samples do not fit into the"),
         ({"facts": {"latitud": 3}}, "facts: unknown key 'latitud'"),
         ({"twin": {"schema": "fogml.twin/1", "nominal": {"b9": 1}}}, "unknown key 'nominal.b9'"),
     ],
