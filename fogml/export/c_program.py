@@ -268,9 +268,10 @@ _EMULATION = ("-cpu", "cortex-a15", "-singlestep", "-d", "exec,nochain")
 
 
 def instructions_per_sample(source: CSource, folder: Path) -> int | None:
-    """Instructions of a Cortex-M4 for one sample, windows full; None without its compiler or qemu-arm, or for
-    half a million and more.
-    A Cortex-M4 takes one cycle for most, two and more for loads, branches and divisions.
+    """Instructions of a Cortex-M4 for one sample, windows full.
+
+    None without its compiler or qemu-arm, or for half a million and more. A Cortex-M4 takes one cycle for
+    most, two and more for loads, branches and divisions.
     """
     compiler, emulator = shutil.which("arm-none-eabi-gcc"), shutil.which("qemu-arm")
     if compiler is None or emulator is None:

@@ -27,7 +27,10 @@ _LEAST_SAMPLES, _MOST_SAMPLES = 4000, 40_000
 _MOST_FILLING = 4_000_000
 """Samples that a history is made longer by at most, so that its windows fill: 2000 s at 2 kHz."""
 _CROSSINGS = 8.0
-"""Times that a history of memories of turns could cross the box at its fastest rate."""
+"""Times that a history of memories of turns could cross the box at its fastest rate.
+
+Two for the sweep; the walk after it, at about half of that rate and with rests, gets to most of the box.
+"""
 _GYRO_DEG_H = 20.0
 """Outputs up to this size are compared; a joint model's scale factor by a point at 10 deg/s."""
 

@@ -143,9 +143,12 @@ def container_blocks(
         ]
         joined, others_of = _one_of_each(joined)
         findings += [*left_out, *_joined_findings(joined), *others_of, *_fields_left_out(stored)]
+        timed = {group.name: group for group in (main, *(group for _, group, _ in joined)) if joined}
+        ends = {name: _clock_ends(path, stored, group) for name, group in timed.items()}
         for cell, group, array in joined:
-            run_s, own_s = _clock_ends(path, stored, main), _clock_ends(path, stored, group)
-            findings += held_beyond(parse_header(cell)[0], run_s, own_s, max(array.shape))
+            findings += held_beyond(
+                parse_header(cell)[0], ends[main.name], ends[group.name], max(array.shape)
+            )
         started = moment(stored.told.get("origin_s"))
         beside = [Beside(cell, group.column("time"), array) for cell, group, array in joined]
         for table in stored_blocks(stored, vectors, tuple(findings), None, rows, columns):

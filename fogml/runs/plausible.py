@@ -220,8 +220,8 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
     middle = np.array([time[a:b].mean() for a, b in spans])
     for name in names:
         # Readings that are none, such as -9999, are few in each part.
-        means = np.array([np.median(run.columns[name][a:b]) for a, b in spans])
-        moved, within_s = np.abs(np.diff(means)), np.diff(middle)
+        medians = np.array([np.median(run.columns[name][a:b]) for a, b in spans])
+        moved, within_s = np.abs(np.diff(medians)), np.diff(middle)
         fast = moved > FASTEST_DEGC_PER_MIN / 60.0 * within_s
         if moved[fast].sum() >= FAR_DEGC:
             told = (
@@ -232,9 +232,9 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
             yield Finding("implausible_clock", told, column="time", count=len(run))
             return
         fastest = float(np.max(moved / within_s, initial=0.0)) * 60.0
-        if np.ptp(means) >= FAR_DEGC and fastest < SLOWEST_DEGC_PER_MIN:
+        if np.ptp(medians) >= FAR_DEGC and fastest < SLOWEST_DEGC_PER_MIN:
             told = (
-                f"'{name}' moves by {short(np.ptp(means))} degC, but never faster than {short(fastest, 2)} "
+                f"'{name}' moves by {short(np.ptp(medians))} degC, but never faster than {short(fastest, 2)} "
                 "degC/min, slower than chamber and weather: is the clock in a shorter unit, as ms or us? "
                 f"Correct its header, as in 'time [ms]'; if samples are {short(run.sample_s)} s apart, "
                 "nothing is to be done"

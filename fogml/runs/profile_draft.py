@@ -11,7 +11,7 @@ import numpy as np
 from fogml.errors import InputError, quoted
 from fogml.escaping import visible
 from fogml.numerals import duration
-from fogml.runs.columns import column_spec, is_accepted, parse_header
+from fogml.runs.columns import column_spec, conversion, is_accepted, parse_header
 from fogml.runs.container_files import groups_of
 from fogml.runs.draft_layout import MOST_ROWS, Field, as_yaml, text_layout
 from fogml.runs.header_spelling import face_of
@@ -28,7 +28,7 @@ _GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xy
 _WARM = re.compile(r"temp|die|oven|therm|^t(\w{0,3}|[_.]\w*)$|温", re.IGNORECASE)
 _AXIS = re.compile(r"([xyz])\W*\Z", re.IGNORECASE)
 _UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
-_UNITS = (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+_UNITS = {unit: conversion("time", unit, "")[0] for unit in ("s", "ms", "us", "ns")}
 _CENTURIES_S = 1e10  # three; what is counted from 1970 is 2e9
 _FEW_VALUES = 20  # of 200: a state, a flag; the noise of a gyro takes more
 _DAYS = ((30_000.0, 80_000.0), (724_000.0, 774_000.0))  # since 1900 or year 0, of the years 1982 to 2119
@@ -169,12 +169,12 @@ def _clock(left: list[Field]) -> list[str]:
         why = "days, as a spreadsheet counts them, or datenum"
         return [f"  time: {{source: {as_yaml(one.source)}, unit: d}}    {_MARK}{why}"]
     # No clock of a laboratory shows centuries.
-    possible = [u for u, scale in _UNITS if not middle * scale > _CENTURIES_S] or ["s"]
+    possible = [u for u, scale in _UNITS.items() if not middle * scale > _CENTURIES_S] or ["s"]
     unit = next((u for u, hint in _UNIT_IN_NAME if re.search(hint, one.name, re.IGNORECASE)), possible[0])
     step = ""
     if len(one.first) > 1:
         ms = f", or {duration(apart / 1000.0)} if they are ms" if unit == "s" and apart > 1.0 else ""
-        lasts = duration(apart * dict(_UNITS)[unit])
+        lasts = duration(apart * _UNITS[unit])
         step = f"steps of {apart:.6g}{f': {lasts}{ms}' if ms or unit != 's' else ''}; "
     return [f"  time: {{source: {as_yaml(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"]
 
