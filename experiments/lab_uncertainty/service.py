@@ -147,7 +147,7 @@ def measured(name: str, repeats: int, seed: int) -> list[dict[str, Any]]:
         rng = np.random.default_rng([seed, repeat])
         if isinstance(case, Service):
             run, true = recorded(case, rng)
-            found = record_run(model(), [run])
+            found = record_run(model(), run)
             for figure, value in true.items():
                 error, se = getattr(found, figure) - value, getattr(found, f"{figure}_se")
                 told.setdefault(figure, []).append(of_errors(error, se) if np.isfinite(se) else None)

@@ -64,7 +64,7 @@ def simulated(unit: int, runs: int, noise: float = 1.0) -> list[RunRecord]:
     model = make_model("polynomial", "T, dT", 0, {})
     training = np.random.default_rng((72, unit))
     model.fit([_simulated_run(training, constants, 1.0) for _ in range(2)])
-    return [record_run(model, [_simulated_run(rng, constants, noise)]) for _ in range(runs)]
+    return [record_run(model, _simulated_run(rng, constants, noise)) for _ in range(runs)]
 
 
 def _simulated_run(rng: np.random.Generator, constants: FloatArray, scale: float) -> Run:
@@ -86,7 +86,7 @@ def real() -> list[list[RunRecord]]:
         pieces = [run[low:high] for low, high in pairwise(edges)]
         model = make_model("mean", None, 0, {})
         model.fit(pieces[:2])
-        found.append([record_run(model, [piece], averaging_s=PIECE_AVERAGE_S) for piece in pieces[2:]])
+        found.append([record_run(model, piece, averaging_s=PIECE_AVERAGE_S) for piece in pieces[2:]])
     return found
 
 

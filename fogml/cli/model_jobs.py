@@ -35,6 +35,7 @@ _WORDS = ("good", "outside training", "window or memory not settled")
 def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> None:
     """Compensate a run block by block into a file, and print how many samples got which flag."""
     from fogml.models.saved import load_model
+    from fogml.runs.checks import check_run
 
     assert settings.run and settings.model and settings.out
     out = Path(settings.out)
@@ -42,7 +43,7 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     blocks = iter(open_blocks(settings.run, repair=settings.repair, axis=settings.axis))
     begun = list(islice(blocks, 1))
     for first in begun:
-        note_wrong(first, terminal)
+        note_wrong(first.name, check_run(first), terminal)
     model = load_model(settings.model)
     total = _expected_rows(settings.run)
     with (

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import closing
 from functools import cache
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from fogml.cli.run_commands import MonitorSettings
-from fogml.cli.runs import check_named_once, note_wrong, open_blocks
+from fogml.cli.runs import check_named_once, note_wrong, open_run
 from fogml.cli.terminal import UNITS_SHOWN, Terminal
 from fogml.errors import InputError, counted, in_one_line
 from fogml.fleet.tasks import FLEET
@@ -98,13 +97,10 @@ def _records(settings: MonitorSettings, terminal: Terminal) -> tuple[list[RunRec
 def _record(
     path: str, model_of: Callable[[Run], DriftModel], settings: MonitorSettings, terminal: Terminal
 ) -> RunRecord:
-    blocks = iter(open_blocks(path, repair=settings.repair))
-    first = next(blocks, None)
-    if first is None or len(first) == 0:
-        raise InputError(f"{path}: holds no samples, there is nothing to monitor")
-    note_wrong(first, terminal)
-    rest, any_unit = chain([first], blocks), settings.any_unit
-    return record_run(model_of(first), rest, averaging_s=settings.averaging, any_unit=any_unit)
+    run = open_run(path, repair=settings.repair)
+    note_wrong(run.name, run.findings, terminal)
+    averaging_s, any_unit = settings.averaging, settings.any_unit
+    return record_run(model_of(run), run, averaging_s=averaging_s, any_unit=any_unit)
 
 
 def _models(place: Path) -> Callable[[Run], DriftModel]:

@@ -16,7 +16,7 @@ from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, listed
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
-from fogml.runs.findings import DEAD, FIRST_OF_ALL
+from fogml.runs.findings import DEAD, FIRST_OF_ALL, Finding
 from fogml.runs.names import renamed
 from fogml.runs.run import Run
 
@@ -183,16 +183,14 @@ def note_findings(runs: Sequence[Run], terminal: Terminal) -> None:
         terminal.note(f"{name}: {finding.message}")
 
 
-def note_wrong(first: Run, terminal: Terminal) -> None:
-    """Note on stderr what makes every figure wrong, by the first block of a run that is read in blocks.
+def note_wrong(name: str, findings: Iterable[Finding], terminal: Terminal) -> None:
+    """Note on stderr what makes every figure of a run wrong.
 
-    That an output has one value is told of the whole run, where its blocks are used.
+    That an output has one value is told where the run is used.
     """
-    from fogml.runs.checks import check_run
-
-    for finding in check_run(first):
+    for finding in findings:
         if finding.code in FIRST_OF_ALL and finding.code != DEAD:
-            terminal.note(f"{first.name}: {finding.message}")
+            terminal.note(f"{name}: {finding.message}")
 
 
 Values = dict[str, Any]

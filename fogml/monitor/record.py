@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 
@@ -13,16 +13,17 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL, Z90
-from fogml.models.base import DriftModel, Evaluation
+from fogml.models.base import DriftModel
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
 from fogml.monitor.figures import Averages, run_figures
 from fogml.runs.checks import spoiling
-from fogml.runs.findings import OF_OUTPUT, OF_TEMPERATURE, SPOILING, Finding, dead_words
+from fogml.runs.findings import OF_OUTPUT, OF_TEMPERATURE, SPOILING, dead_words
 from fogml.runs.run import Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
+from fogml.signals import large
 from fogml.signals.averages import AVERAGING_S, window_numbers
 
 FIGURES = {
@@ -125,20 +126,20 @@ NUMBERS = tuple(f.name for f in fields(RunRecord) if f.type == "float")
 
 def record_run(
     model: DriftModel,
-    blocks: Iterable[Run],
+    run: Run,
     *,
     averaging_s: float = AVERAGING_S,
     any_unit: bool = False,
     most_spoilt: float = 0.01,
 ) -> RunRecord:
-    """What a model leaves on a run that comes in blocks.
+    """What a model leaves on a run, which may be longer than memory (`fogml.signals.large`).
 
     Parameters
     ----------
     model
         A fitted model.
-    blocks
-        Blocks of one recording in order of time.
+    run
+        A run in service.
     averaging_s
         Averaging time of the figures [s].
     any_unit
@@ -155,21 +156,19 @@ def record_run(
         averages, one value in every sample, more spoilt samples than `most_spoilt`, or numbers that can't be
         what the run states of its output.
     """
-    recording = _Recording(model, averaging_s)
-    for block, evaluation in evaluate_blocks(model, blocks, any_unit=any_unit):
-        recording.add(block, evaluation)
-    first = recording.first
-    if first is None:
+    if len(run) == 0:
         raise InputError("the run holds no samples, there is nothing to monitor")
-    if recording.low == recording.high:
-        raise InputError(f"{first.name}: {dead_words(recording.low)}; it is not kept, record it again")
-    if averaging_s < (1.0 - 1e-6) * recording.means.sample_s:
+    facts, sha = run.facts, model_hash(model)
+    recording = _Recording(model, run, averaging_s, any_unit)
+    if (extremes := large.extremes(run.gyro))[0] == extremes[1]:
+        raise InputError(f"{run.name}: {dead_words(extremes[0])}; it is not kept, record it again")
+    if averaging_s < (1.0 - 1e-6) * run.sample_s:
         raise InputError(
-            f"{first.name}: a sample every {recording.means.sample_s:g} s makes no averages over "
+            f"{run.name}: a sample every {run.sample_s:g} s makes no averages over "
             f"{averaging_s:g} s; set --averaging to that interval or more"
         )
     time, mean = recording.means.values()
-    used, is_inside = recording.used(mean, first.name, averaging_s)
+    used, is_inside = recording.used(mean)
     recording.hold_usable(is_inside, most_spoilt)
     half = mean["half"][used]
     told = run_figures(
@@ -185,19 +184,18 @@ def record_run(
         model,
         outside_deviation=0.0 if is_inside else float(np.sqrt(np.mean(half**2))) / Z90,
     )
-    facts, sha = first.facts, model_hash(model)
     beyond = float(np.mean(np.abs(mean["left"][used]) > half))
     return RunRecord(
-        key=recording.key(sha),
+        key=_key(run, sha, averaging_s),
         unit=facts.unit or "",
         axis=facts.axis or "",
-        run=first.name,
+        run=run.name,
         model=sha,
         started=facts.started.isoformat() if facts.started else "",
         monitored=datetime.now(UTC).isoformat(timespec="seconds"),
-        span_s=recording.last_s - float(first.time[0]),
-        samples=float(recording.samples),
-        outside_training=recording.outside / recording.samples,
+        span_s=run.span_s,
+        samples=float(len(run)),
+        outside_training=recording.outside / len(run),
         beyond_interval=beyond if recording.earth_known else float("nan"),
         half_width=float(half.mean()),
         averaging_s=averaging_s,
@@ -205,55 +203,57 @@ def record_run(
     )
 
 
-class _Recording:
-    """What is gathered of a recording that comes in blocks."""
+def _key(run: Run, sha: str, averaging_s: float) -> str:
+    """Digest of a recording, its unit and the model's `sha`."""
+    digest = hashlib.sha256()
+    about = (run.facts.unit or "", run.facts.axis or "", sha, run.gyro_unit, repr(averaging_s))
+    for text in about:
+        digest.update(f"{text}\0".encode())
+    for name in sorted(run.columns):
+        column, values = hashlib.sha256(), run.columns[name]
+        for part in large.pieces(values):
+            column.update(np.ascontiguousarray(values[part]).data)
+        digest.update(f"{name}\0{column.hexdigest()}".encode())
+    return digest.hexdigest()
 
-    def __init__(self, model: DriftModel, averaging_s: float) -> None:
-        self.model = model
+
+class _Recording:
+    """What is gathered of a recording, piece by piece."""
+
+    def __init__(self, model: DriftModel, run: Run, averaging_s: float, any_unit: bool) -> None:
         # A model whose training did not tell Earth rate holds it, so that no run's is taken off once more.
         self.earth_known = model.card_.earth_known
-        self.means = _Means(averaging_s)
-        self.columns: dict[str, hashlib._Hash] = {}
-        self.first: Run | None = None
-        self.samples = self.outside = self.unsettled = 0
-        self.last_s = 0.0
-        self.low, self.high = np.inf, -np.inf
-        self.spoilt: list[Finding] = []
-
-    def add(self, block: Run, evaluation: Evaluation) -> None:
-        """Add a block and what the model tells of it."""
-        self.first = self.first or block
-        if self.earth_known and not block.earth_known:
+        if self.earth_known and not run.earth_known:
             raise InputError(
-                f"{block.name}: states no latitude and input_axis, but the model was trained with Earth rate "
+                f"{run.name}: states no latitude and input_axis, but the model was trained with Earth rate "
                 "known: the run's bias would hold it; state both in the run's side file"
             )
-        for name, values in block.columns.items():
-            self.columns.setdefault(name, hashlib.sha256()).update(np.ascontiguousarray(values).data)
-        moving = turning(block) if "rate" in block.columns else np.zeros(len(block), dtype=bool)
-        kept = evaluation.full & evaluation.settled
-        self.unsettled += int(np.count_nonzero(~kept))
-        if moving.any():
-            kept &= ~transition_mask(block)
-        warmth = leading_temperature(block)
-        reference = block.reference_deg_h if self.earth_known else 3600.0 * block.rate
-        self.means.add(
-            block.time,
-            kept,
-            left=block.gyro_deg_h - reference - (0.0 if block.facts.compensated else evaluation.drift),
-            temperature=np.zeros(len(block)) if warmth is None else warmth,
-            reference=reference,
-            half=self.model.intervals_.half_width(LEVEL, evaluation.excess),
-            moving=moving.astype(np.float64),
-            outside=evaluation.outside.astype(np.float64),
-        )
-        self.samples += len(block)
-        self.low, self.high = min(self.low, float(block.gyro.min())), max(self.high, float(block.gyro.max()))
-        self.spoilt += spoiling(block)
-        self.outside += int(np.count_nonzero(evaluation.outside & evaluation.full))
-        self.last_s = float(block.time[-1])
+        self.run, self.averaging_s = run, averaging_s
+        self.means = _Means(averaging_s, float(run.time[0]), run.sample_s)
+        self.outside = self.unsettled = 0
+        moving = turning(run) if "rate" in run.columns else np.zeros(len(run), dtype=bool)
+        # Changes of the rate are told by all of the run: how noisy it is, how long they last.
+        calm = ~transition_mask(run) if moving.any() else ~moving
+        warmth = leading_temperature(run)
+        blocks = (run[part] for part in large.pieces(run.time))
+        told = evaluate_blocks(model, blocks, any_unit=any_unit)
+        for part, (block, evaluation) in zip(large.pieces(run.time), told, strict=True):
+            kept = evaluation.full & evaluation.settled
+            self.unsettled += int(np.count_nonzero(~kept))
+            reference = block.reference_deg_h if self.earth_known else 3600.0 * block.rate
+            self.means.add(
+                block.time,
+                kept & calm[part],
+                left=block.gyro_deg_h - reference - (0.0 if run.facts.compensated else evaluation.drift),
+                temperature=np.zeros(len(block)) if warmth is None else warmth[part],
+                reference=reference,
+                half=model.intervals_.half_width(LEVEL, evaluation.excess),
+                moving=moving[part].astype(np.float64),
+                outside=evaluation.outside.astype(np.float64),
+            )
+            self.outside += int(np.count_nonzero(evaluation.outside & evaluation.full))
 
-    def used(self, mean: Mapping[str, FloatArray], name: str, averaging_s: float) -> tuple[BoolArray, bool]:
+    def used(self, mean: Mapping[str, FloatArray]) -> tuple[BoolArray, bool]:
         """Averages that tell what is left, at rest where there are enough; and whether inside training."""
         rest = mean["moving"] == 0.0
         used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(rest), dtype=bool)
@@ -262,9 +262,9 @@ class _Recording:
         used = inside if (is_inside := bool(inside.sum() >= LEAST_WINDOWS)) else used
         if used.sum() < LEAST_WINDOWS:
             raise InputError(
-                f"{name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows "
-                f"are full; {LEAST_WINDOWS} are needed to tell what the model leaves, "
-                + (_SETTLING if 2 * self.unsettled > self.samples else "record longer or set --averaging")
+                f"{self.run.name}: holds {int(used.sum())} averages over {self.averaging_s:g} s whose "
+                f"windows are full; {LEAST_WINDOWS} are needed to tell what the model leaves, "
+                + (_SETTLING if 2 * self.unsettled > len(self.run) else "record longer or set --averaging")
             )
         return used, is_inside
 
@@ -273,41 +273,24 @@ class _Recording:
 
         A temperature that can't be is refused where it lies outside training: else the model bears it out.
         """
-        assert self.first is not None
         counts: Counter[str] = Counter()
-        for finding in self.spoilt:
+        for finding in spoiling(self.run):
             wrong = finding.code in OF_OUTPUT or (finding.code in OF_TEMPERATURE and not is_inside)
             if finding.code in SPOILING:
                 counts[finding.code] += finding.count if finding.at_rest is None else finding.at_rest
-            if wrong or counts[finding.code] > most_spoilt * self.samples:
-                raise InputError(f"{self.first.name}: {finding.message}; until that is right it is not kept")
-
-    def key(self, sha: str) -> str:
-        """Digest of the recording, its unit and the model's `sha`."""
-        assert self.first is not None
-        facts, digest = self.first.facts, hashlib.sha256()
-        about = (facts.unit or "", facts.axis or "", sha, self.first.gyro_unit, repr(self.means.window_s))
-        for text in about:
-            digest.update(f"{text}\0".encode())
-        for name in sorted(self.columns):
-            digest.update(f"{name}\0{self.columns[name].hexdigest()}".encode())
-        return digest.hexdigest()
+            if wrong or counts[finding.code] > most_spoilt * len(self.run):
+                raise InputError(f"{self.run.name}: {finding.message}; until that is right it is not kept")
 
 
 class _Means:
     """Means over windows of samples that come in blocks."""
 
-    def __init__(self, window_s: float) -> None:
-        self.window_s = window_s
-        self.start: float | None = None
+    def __init__(self, window_s: float, start_s: float, sample_s: float) -> None:
+        self.window_s, self.start, self.sample_s = window_s, start_s, sample_s
         self.parts: list[tuple[IntArray, dict[str, FloatArray]]] = []
-        self.sample_s = 0.0
 
     def add(self, time: FloatArray, kept: BoolArray, **columns: FloatArray) -> None:
         """Add a block's samples; of those that are not kept none counts."""
-        if self.start is None:
-            self.start = float(time[0])
-            self.sample_s = float(np.median(np.diff(time))) if len(time) > 1 else self.window_s
         window = window_numbers(time[kept], self.start, self.sample_s, self.window_s).astype(np.int64)
         names, place = np.unique(window, return_inverse=True)
         sums: dict[str, FloatArray] = {

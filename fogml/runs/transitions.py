@@ -11,6 +11,7 @@ from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.runs.settling import LEAST_ROWS, settling_rows
 from fogml.runs.turning import least_rate_deg_s, white_noise
+from fogml.signals import large
 
 MARGIN_BEYOND_S = 2.5
 """The margin is this much longer than the time to rate, which the source bounds by 5 s."""
@@ -52,8 +53,10 @@ def time_to_rate_s(run: Run, settled_share: float = 0.02, noises: float = 6.0) -
     if len(changes.start) == 0:
         return 0.0
     # Of lost rows a change may have lasted through all or none; some change has hardly any.
-    lasted = np.concatenate(([0.0], np.cumsum(np.minimum(np.diff(run.time), run.sample_s))))
-    longest = float((lasted[changes.stop] - lasted[changes.start]).max())
+    longest = max(
+        float(np.minimum(np.diff(run.time[start : stop + 1]), run.sample_s).sum())
+        for start, stop in zip(changes.start, changes.stop, strict=True)
+    )
     return max(longest, _gyro_settling_s(run, changes, settled_share, noises))
 
 
@@ -94,10 +97,10 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
     last = np.searchsorted(time, time[starts] + settled_s, side="right")
     if by_default:
         last = np.maximum(last, changes.stop)
-    edges = np.zeros(len(run) + 1, dtype=np.int64)
-    np.add.at(edges, np.minimum(first, np.maximum(starts - 1, 0)), 1)
-    np.add.at(edges, last, -1)
-    return np.asarray(np.cumsum(edges[:-1]) > 0)
+    mask = np.zeros(len(run), dtype=np.bool_)
+    for begin, end in zip(np.minimum(first, np.maximum(starts - 1, 0)), last, strict=True):
+        mask[begin:end] = True
+    return mask
 
 
 def _changes(run: Run) -> _Changes:
@@ -137,11 +140,14 @@ def _spread(values: FloatArray) -> float:
 
 def _level_changes(run: Run, values: FloatArray, least: float) -> _Changes:
     """Where a series moves by more than `least` within a second, single outliers left out."""
-    lag = max(1, round(_LAG_S / run.sample_s))
+    lag = min(max(1, round(_LAG_S / run.sample_s)), len(values))
     clean = _median_of_three(values)
-    earlier = np.concatenate([np.full(lag, clean[0]), clean])[: len(clean)]
-    moved = np.abs(clean - earlier) > least
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], moved, [False]]).astype(np.int8)))
+    moved = np.zeros(len(values) + 2, dtype=np.bool_)
+    moved[1 : lag + 1] = np.abs(clean[:lag] - clean[0]) > least
+    for part in large.pieces(clean, overlap=lag):
+        now = slice(part.start + lag, part.stop)
+        moved[now.start + 1 : now.stop + 1] = np.abs(clean[now] - clean[part.start : part.stop - lag]) > least
+    edges = np.flatnonzero(moved[1:] != moved[:-1])
     # The first row that differs from the one a lag before begins the change; a lag before the
     # last such row it has ended.
     start, stop = edges[::2], edges[1::2]
@@ -165,9 +171,13 @@ def _lasting(run: Run, values: FloatArray, changes: _Changes, least: float) -> _
 
 
 def _median_of_three(values: FloatArray) -> FloatArray:
-    left, middle, right = values[:-2], values[1:-1], values[2:]
-    inner = np.maximum(np.minimum(left, middle), np.minimum(np.maximum(left, middle), right))
-    return np.concatenate([values[:1], inner, values[-1:]])
+    made = large.empty(len(values))
+    made[0], made[-1] = values[0], values[-1]
+    for part in large.pieces(values, overlap=2):
+        left, middle, right = (values[part.start + i : part.stop - 2 + i] for i in range(3))
+        inner = np.minimum(np.maximum(left, middle), right)
+        made[part.start + 1 : part.stop - 1] = np.maximum(np.minimum(left, middle), inner)
+    return made
 
 
 def _gyro_settling_s(run: Run, changes: _Changes, settled_share: float, noises: float) -> float:
