@@ -120,6 +120,23 @@ REMEDIES = {
 """What to do where something can't be written."""
 
 
+class Held(InputError):
+    """An output is another's that still runs.
+
+    Attributes
+    ----------
+    who
+        Process and host, as far as the lock states them.
+    """
+
+    def __init__(self, path: str | Path, who: str, lock: Path) -> None:
+        self.who = who
+        super().__init__(
+            f"{path}: {who} is writing it; wait for that to end, or choose another --out "
+            f"(if no such process runs any more, remove {lock})"
+        )
+
+
 @contextmanager
 def sole_writer(path: str | Path) -> Iterator[None]:
     """Hold the lock on an output, a file ``.NAME.lock`` beside it that names process and host.
@@ -127,6 +144,11 @@ def sole_writer(path: str | Path) -> Iterator[None]:
     The system takes the lock back from a process that has ended, on whichever host of a shared file
     system. Where the file system has no locks, what the file states counts: a process of this host by
     whether it lives, one of another host as living.
+
+    Raises
+    ------
+    Held
+        If another process has it.
     """
     real = Path(os.path.realpath(path))
     home = real if real.is_dir() and has_to_stay(real) else nearest_folder(real.parent)
@@ -143,10 +165,8 @@ def sole_writer(path: str | Path) -> Iterator[None]:
         owner = _owner(told)
         if not free or (not lock.sure and _may_live(owner)):
             lock.release()
-            who = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
-            raise InputError(
-                f"{path}: {who} is writing it; wait for that to end, or choose another --out "
-                f"(if no such process runs any more, remove {lock.path})"
+            raise Held(
+                path, f"process {owner['pid']} on {owner['host']}" if owner else "another process", lock.path
             )
         pid = os.getpid()
         lock.write(json.dumps({"pid": pid, "host": socket.gethostname(), "started": process_start(pid)}))

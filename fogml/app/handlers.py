@@ -17,7 +17,6 @@ from tornado.iostream import StreamClosedError
 from tornado.web import HTTPError, RequestHandler, stream_request_body
 
 import fogml
-from fogml.app.jobs import command_line
 from fogml.app.state import OFFERED, App
 from fogml.errors import FogmlError, InputError
 
@@ -173,12 +172,8 @@ class _State(_Handler):
 
 class _Command(_Handler):
     def post(self) -> None:
-        """The command line of a form, or what is wrong with it."""
-        command, values = self.asked()
-        try:
-            self.answer({"line": command_line(self.app.words(command, values, "jobs/NEW/results"))})
-        except FogmlError as error:
-            self.answer({"fault": str(error)})
+        """The command line of a form, and what is missing or wrong."""
+        self.answer(self.app.line(*self.asked()))
 
 
 class _NewJob(_Handler):
@@ -186,7 +181,7 @@ class _NewJob(_Handler):
         command, values = self.asked()
         try:
             # What is wrong is said before there is a job.
-            self.app.words(command, values, "")
+            self.app.check(command, values)
             name = self.app.jobs.add(lambda results: self.app.words(command, values, results))
         except FogmlError as error:
             raise HTTPError(400, str(error)) from None

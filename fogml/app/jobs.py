@@ -54,7 +54,7 @@ def begin(folder: Path) -> None:
     heard, told = os.pipe()
     pid = os.fork()
     if pid:
-        process = {"pid": pid, "started": process_start(pid), "child": None}
+        process = {"pid": pid, "started": process_start(pid), "child": None, "child_started": ""}
         os.write(told, b"1" if _claim(folder, process) else b"0")
         return
     os.setsid()
@@ -83,7 +83,8 @@ def run(folder: Path) -> None:
             stderr=err,
             env=of_this_package(),
         )
-        tell(folder / PROCESS, {**process, "child": child.pid})
+        held = {"child": child.pid, "child_started": process_start(child.pid)}
+        tell(folder / PROCESS, {**process, **held})
         if (folder / CANCELLED).exists():
             with contextlib.suppress(ProcessLookupError):
                 child.terminate()
@@ -157,16 +158,18 @@ class Jobs:
         folder = self.folder / name
         ended = _read(folder / ENDED)
         if ended is not None:
-            return "cancelled" if (folder / CANCELLED).exists() else STATES.get(ended["status"], "failed")
+            return STATES.get(ended["status"]) or self._broken_off(name)
         process = _read(folder / PROCESS)
         if process is None:
             return "waiting"
-        if process_is_alive(process["pid"], process["started"]):
+        if _lives(process):
             return "running"
         # It may have ended between the two looks.
-        if (folder / ENDED).exists():
-            return self.state(name)
-        return "cancelled" if (folder / CANCELLED).exists() else "failed"
+        return self.state(name) if (folder / ENDED).exists() else self._broken_off(name)
+
+    def _broken_off(self, name: str) -> str:
+        """State of a job that says of itself neither how it ended nor that it was asked to."""
+        return "cancelled" if (self.folder / name / CANCELLED).exists() else "failed"
 
     def told(self, name: str) -> dict[str, Any]:
         """A job in short: number, command line, state, when it was asked for, its progress."""
@@ -231,7 +234,7 @@ class Jobs:
             tell(folder / ENDED, {"status": 130, "seconds": 0.0})
             return
         process = _read(folder / PROCESS)
-        if process is None or not process_is_alive(process["pid"], process["started"]):
+        if process is None:
             return
         with contextlib.suppress(ProcessLookupError):
             if again:
@@ -259,6 +262,14 @@ class Jobs:
 def command_line(words: list[str]) -> str:
     """The command line of a job, to be run in the app's folder."""
     return shlex.join(["fogml", *words])
+
+
+def _lives(process: dict[str, Any]) -> bool:
+    """Whether a job's process runs, or its command, which goes on should the process be killed."""
+    if process_is_alive(process["pid"], process["started"]):
+        return True
+    child = process["child"]
+    return child is not None and process_is_alive(child, process.get("child_started", ""))
 
 
 def _read(path: Path) -> dict[str, Any] | None:

@@ -6,12 +6,13 @@ import os
 import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import chdir
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from fogml.app.jobs import Jobs
-from fogml.errors import InputError, quoted
+from fogml.app.jobs import Jobs, command_line
+from fogml.errors import FogmlError, InputError, quoted
 
 LONGEST_NAME_BYTES = 180
 """Of a file's name: with what outputs add to it, it stays below the 255 bytes that systems allow."""
@@ -90,6 +91,7 @@ class Files:
 OFFERED = ("model", "models", "twin", "file", "profile", "manifest", "fleet")
 """Kinds of inputs that the page offers as lists; runs are chosen beside their names."""
 WordsOf = Callable[[str, Mapping[str, Any], Callable[[str], Sequence[str]], str], list[str]]
+Check = Callable[[str, Mapping[str, Any], list[str]], None]
 
 
 @dataclass(frozen=True)
@@ -112,22 +114,47 @@ class App:
         Commands with inputs and settings, as the page draws them.
     words_of
         Gives the words of a command line of command, values, known paths and folder of results.
+    check
+        Holds that a job can begin with command, values and their words.
     limits
         Bounds.
     """
 
-    def __init__(self, home: Path, forms: list[dict[str, Any]], words_of: WordsOf, limits: Limits) -> None:
+    def __init__(
+        self, home: Path, forms: list[dict[str, Any]], words_of: WordsOf, check: Check, limits: Limits
+    ) -> None:
         self.home, self.forms, self.limits = home, forms, limits
         self.files, self.jobs = Files(home), Jobs(home, limits.jobs_at_once)
         self.token = secrets.token_urlsafe(24)
         self.asked_at = time.monotonic()
         self.hosts: tuple[str, ...] = ()
         self.cookie = ""
-        self._words_of = words_of
+        self._words_of, self._check = words_of, check
 
-    def words(self, command: str, values: Mapping[str, Any], results: str) -> list[str]:
+    def words(self, command: str, values: Mapping[str, Any], results: str = "jobs/NEW/results") -> list[str]:
         """The words of a command line, with paths of this folder alone."""
         return self._words_of(command, values, self.offered, results)
+
+    def check(self, command: str, values: Mapping[str, Any]) -> None:
+        """Hold that a job can begin with what was filled in.
+
+        Raises
+        ------
+        InputError
+            With what is missing or wrong.
+        """
+        with chdir(self.home):
+            self._check(command, values, self.words(command, values))
+
+    def line(self, command: str, values: Mapping[str, Any]) -> dict[str, str]:
+        """The command line of a form, as far as there is one, and what is missing or wrong (`fault`)."""
+        told: dict[str, str] = {}
+        try:
+            told["line"] = command_line(self.words(command, values))
+            self.check(command, values)
+        except FogmlError as error:
+            told["fault"] = str(error)
+        return told
 
     def files_told(self) -> list[dict[str, Any]]:
         """Files that were dropped, and runs that were imported."""

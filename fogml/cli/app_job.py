@@ -7,13 +7,14 @@ from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
+from fogml.cli.command import SettingsCommand
 from fogml.cli.given import Given, load
 from fogml.cli.main import COMMANDS
 from fogml.cli.run_commands import AppSettings
 from fogml.cli.settings import SHIPPED, Settings, given_settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, install_words, quoted
-from fogml.locks import sole_writer
+from fogml.locks import Held, sole_writer
 
 INPUTS: Mapping[str, Mapping[str, str]] = {
     "import": {"file": "run", "profile": "profile"},
@@ -143,6 +144,21 @@ def words_of(
     return [command, *places, *named, *FIXED.get(command, []), "--out", out]
 
 
+def check_form(command: str, values: Mapping[str, Any], words: list[str]) -> None:
+    """Hold that a job can begin with a form and its words: nothing is missing, values are as expected.
+
+    Raises
+    ------
+    InputError
+        With what is missing or wrong.
+    """
+    for key, given in given_settings(settings_of(command)).items():
+        # On the line what comes next would stand in its place.
+        if given.needed and not _texts(key, values.get(key)):
+            raise InputError(given.needed)
+    SettingsCommand(command, settings_of(command)).check_words(words[1:])
+
+
 def _checked(path: str, takes: str, known: Callable[[str], Sequence[str]], given: Given) -> str:
     """A path that the app offers, or a name that ships."""
     ships = given.known_names() if path.startswith(SHIPPED) or takes in NAMED else ()
@@ -198,13 +214,12 @@ def serve(settings: AppSettings, terminal: Terminal) -> None:
     with ExitStack() as held:
         try:
             held.enter_context(sole_writer(home / "server"))
-        except InputError as error:
-            who = str(error).partition(";")[0].rpartition(": ")[2]
+        except Held as error:
             raise InputError(
-                f"{home}: another fogml app serves this folder ({who}); open the address that it printed, or "
-                "end it first"
+                f"{home}: another fogml app serves this folder ({error.who}); open the address that it "
+                "printed, or end it first"
             ) from None
-        app = App(home, forms(), words_of, limits)
+        app = App(home, forms(), words_of, check_form, limits)
         listening, address = listen(app, settings.port)
         terminal.result({"address": address, "folder": str(home)})
         terminal.say(f"Open {address}")

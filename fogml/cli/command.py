@@ -16,7 +16,7 @@ from fogml.cli.each_axis import do_job
 from fogml.cli.given import HELP_NAMES, Given, HelpContext
 from fogml.cli.settings import Settings, given_settings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, did_you_mean, printable, quoted
 from fogml.json_files import json_text
 
 
@@ -87,16 +87,43 @@ class SettingsCommand(click.Command):
                 args = spread_values(args, *_names(key, given))
         return super().parse_args(ctx, args)
 
-    def _do(self, /, config: str | None, as_json: bool, quiet: bool, **values: Any) -> None:
+    def check_words(self, words: list[str]) -> None:
+        """Hold that a job can begin with what a command line gives.
+
+        Raises
+        ------
+        InputError
+            With what is missing or wrong, as the command says it before its job begins.
+        """
+        try:
+            told = dict(self.make_context(self.name, list(words)).params)
+        except click.UsageError as error:
+            raise InputError(usage_words(error)) from None
+        del told["as_json"], told["quiet"]
+        self._gathered(**told).check_given()
+
+    def _gathered(self, /, config: str | None, **values: Any) -> Settings:
         named = values.pop("config" + _OWN, None)
         if named is not None and config is not None:
             raise InputError("CONFIG and --config are the same file; give one of them")
         stated = named if config is None else config
-        settings = self.settings.gather(None if stated is None else Path(stated), _flags(values))
+        return self.settings.gather(None if stated is None else Path(stated), _flags(values))
+
+    def _do(self, /, as_json: bool, quiet: bool, **values: Any) -> None:
+        settings = self._gathered(**values)
         # Without the program's own name: "train", "lab acceptance".
         command = click.get_current_context().command_path.partition(" ")[2]
         if not do_job(settings, command, Terminal(as_json, quiet)):
             raise click.exceptions.Exit(1)
+
+
+def usage_words(error: click.UsageError) -> str:
+    """What click complains of, as fogml tells it."""
+    text = error.format_message().rstrip(".")
+    if isinstance(error, click.NoSuchOption):
+        near = did_you_mean(error.option_name, error.possibilities or (), most=2)
+        text = f"no such option '{error.option_name}'; {near}".rstrip("; ")
+    return f"{text[:1].lower()}{text[1:]}"
 
 
 class Place(click.Path):
@@ -116,6 +143,11 @@ def spread_values(arguments: list[str], *options: str) -> list[str]:
     """The arguments with ``option a b`` written as ``option a option b``.
 
     Values end at the next argument that begins with a dash.
+
+    Raises
+    ------
+    InputError
+        If a value follows ``option=a``: it may be meant as the option's, too, or as an argument.
     """
     spread: list[str] = []
     inside = ""
@@ -123,6 +155,13 @@ def spread_values(arguments: list[str], *options: str) -> list[str]:
         if argument == "--":
             return [*spread, *arguments[position:]]
         if argument.startswith("-") and argument != "-":
+            option, joined, value = argument.partition("=")
+            if joined and option in options and _value_follows(arguments, position):
+                first, second = printable(value), printable(arguments[position + 1])
+                raise InputError(
+                    f"{option}={first} {second}: whether {second} belongs to {option} is not clear; write "
+                    f"'{option} {first} {second}' if it does, else name it before {option}"
+                )
             inside = argument if argument in options else ""
             if not inside or not _value_follows(arguments, position):
                 spread.append(argument)

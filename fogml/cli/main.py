@@ -222,12 +222,10 @@ def fail(message: str) -> None:
 def _fail_usage(error: click.UsageError) -> None:
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         raise error
-    text = error.format_message().rstrip(".")
-    if isinstance(error, click.NoSuchOption):
-        near = did_you_mean(error.option_name, error.possibilities or (), most=2)
-        text = f"no such option '{error.option_name}'; {near}".rstrip("; ")
+    from fogml.cli.command import usage_words
+
     command = error.ctx.command_path if error.ctx else "fogml"
-    fail(f"{text[:1].lower()}{text[1:]} ('{command} --help' lists what there is)")
+    fail(f"{usage_words(error)} ('{command} --help' lists what there is)")
 
 
 def _interrupted(interrupt: KeyboardInterrupt) -> int:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import Any, ClassVar
 
 from fogml.cli import options
-from fogml.cli.settings import Settings, placed, setting
+from fogml.cli.settings import Settings, given_settings, placed, setting
+from fogml.errors import InputError
 from fogml.fleet import FORM
 from fogml.tracking import shown_tracker
 
@@ -54,10 +56,19 @@ class ImportSettings(Settings):
     out: options.FolderIfNamed = None
 
     def check_given(self) -> None:
-        """As `Settings.check_given`, and that nothing is asked of an import where a draft is."""
+        """As `Settings.check_given`, and what an import needs and a draft does not."""
         super().check_given()
         if self.draft:
             self.refuse_idle(("profile", "axis"), "is of an import; leave it out with --draft")
+            return
+        if not self.profile:
+            draft = shlex.join(["fogml", "import", str(self.file), "--draft", "-o", "profile.yaml"])
+            ships = ", ".join(given_settings(type(self))["profile"].known_names())
+            raise InputError(
+                f"no --profile is given; those that ship are {ships}, and '{draft}' writes a first one"
+            )
+        if not self.out:
+            raise InputError("no --out is given; name the folder for the runs")
 
 
 class InspectSettings(Settings):

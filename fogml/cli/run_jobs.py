@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -27,20 +28,15 @@ _FIRST_ROWS = 5
 
 def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
     """Import, write the runs into ``settings.out``, and say what was written."""
-    from fogml.runs.profiles import import_recording, profile_names
+    from fogml.runs.profiles import import_recording
     from fogml.runs.writing import check_side_file, write_run
 
     assert settings.file
     if settings.draft:
         _draft(settings, terminal)
         return
-    if not settings.profile:
-        raise InputError(
-            f"no --profile is given; those that ship are {', '.join(profile_names())}, and "
-            f"'fogml import {Path(settings.file).name} --draft -o profile.yaml' writes a first one"
-        )
-    if not settings.out:
-        raise InputError("no --out is given; name the folder for the runs")
+    assert settings.profile
+    assert settings.out
     written = []
     with whole_folder(settings.out, shared=True) as folder:
         with terminal.work(f"reading {settings.file}") as work:
@@ -95,7 +91,7 @@ def _draft(settings: ImportSettings, terminal: Terminal) -> None:
         with whole_file(settings.out) as file:
             file.write_text(text, encoding="utf-8")
         terminal.say(f"Written to {settings.out}; correct what it calls a guess, then")
-        terminal.say(f"fogml import {path.name} --profile {Path(settings.out).name} -o FOLDER")
+        terminal.say(shlex.join(["fogml", "import", str(path), "--profile", settings.out, "-o", "FOLDER"]))
     else:
         terminal.say(text.rstrip())
     for run in runs:

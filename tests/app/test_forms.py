@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from fogml.cli.app_job import INPUTS, forms, words_of
+from fogml.cli.app_job import INPUTS, check_form, forms, words_of
 from fogml.cli.main import app
 from fogml.errors import InputError
 
@@ -63,6 +63,20 @@ def test_paths_are_those_that_are_listed(path: str) -> None:
     for command, key in (one.split() for one in inputs.split(", ")):
         with pytest.raises(InputError, match="choose one that is listed"):
             words(command, **{key: [path]})
+
+
+@pytest.mark.parametrize("command", INPUTS)
+def test_a_form_that_no_job_can_begin_with_says_what_is_missing_or_wrong(command: str) -> None:
+    def checked(**values: Any) -> None:
+        check_form(command, values, words(command, **values))
+
+    with pytest.raises(InputError, match=r"no .* is given; name"):
+        checked()
+    with pytest.raises(InputError, match=r"no .* is given; name"):
+        # On the line what is chosen would come first.
+        checked(**{key: KNOWN[takes][:1] for key, takes in [*INPUTS[command].items()][1:]})
+    with pytest.raises(InputError, match="seed"):
+        checked(seed="x", **{key: KNOWN[takes][:1] for key, takes in INPUTS[command].items()})
 
 
 def test_values_are_no_options_and_other_settings_are_refused() -> None:

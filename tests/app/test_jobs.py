@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fogml.app.jobs import PROCESS, Jobs
+from fogml.app.jobs import CANCELLED, ENDED, PROCESS, Jobs
 from fogml.errors import InputError
 
 ENDLESS = ["app", "endless", "--port", "0"]
@@ -99,6 +99,30 @@ def test_a_job_whose_processes_are_gone_has_failed(tmp_path: Path) -> None:
     assert group != os.getpgid(0)
     os.killpg(group, signal.SIGKILL)
     until("failed", jobs, name)
+
+
+def test_a_command_whose_runner_is_killed_still_runs_and_is_cancelled(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path, 1)
+    name = jobs.add(lambda results: ENDLESS)
+    while "Open" not in jobs.in_full(name)["stdout"]:
+        time.sleep(0.02)
+    os.kill(json.loads((tmp_path / "jobs" / name / PROCESS).read_text())["pid"], signal.SIGKILL)
+    assert jobs.state(name) == "running"
+    with pytest.raises(InputError, match="cancel it first"):
+        jobs.remove(name)
+    jobs.cancel(name)
+    until("cancelled", jobs, name)
+
+
+def test_what_was_done_before_it_heard_of_a_cancel_is_done(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path, 0)
+    name = jobs.add(lambda results: ["docs"])
+    (tmp_path / "jobs" / name / CANCELLED).touch()
+    states = {}
+    for status in (0, 1, 143, -15):
+        (tmp_path / "jobs" / name / ENDED).write_text(json.dumps({"status": status, "seconds": 1.0}))
+        states[status] = jobs.state(name)
+    assert states == {0: "done", 1: "limit", 143: "cancelled", -15: "cancelled"}
 
 
 def test_runs_to_choose_from_are_those_that_were_imported(tmp_path: Path) -> None:

@@ -170,6 +170,8 @@ def test_a_bad_form_is_one_line_and_no_job(app):
     for told in ({"command": "blind", "values": {}}, {"command": "inspect", "values": {"out": "/tmp/x"}}):
         status, text, _ = app.ask("POST", "/api/jobs", told)
         assert status == 400 and "the app has no" in text
+    status, text, _ = app.ask("POST", "/api/jobs", {"command": "monitor", "values": {}})
+    assert (status, text.partition(";")[0]) == (400, "no model is given")
     assert app.ask("POST", "/api/jobs", b"[]")[0] == 400
     # More than a form is not read to its end.
     with contextlib.suppress(ConnectionError):

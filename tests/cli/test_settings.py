@@ -160,7 +160,8 @@ def test_written_settings_read_back_the_same(tmp_path, monkeypatch):
         (["a", "--test", "b", "c", "--seed", "1"], ["a", "--test", "b", "--test", "c", "--seed", "1"]),
         (["a", "--test", "b", "--test", "c"], ["a", "--test", "b", "--test", "c"]),
         (["--test", "b", "-o", "x", "a"], ["--test", "b", "-o", "x", "a"]),
-        (["a", "--test=b", "c"], ["a", "--test=b", "c"]),
+        (["a", "--test=b", "--seed", "1", "c"], ["a", "--test=b", "--seed", "1", "c"]),
+        (["a", "--test=b", "--", "c"], ["a", "--test=b", "--", "c"]),
         (["a", "--test"], ["a", "--test"]),
         (["a", "--test", "--json"], ["a", "--test", "--json"]),
         (["--test", "b", "--", "c"], ["--test", "b", "--", "c"]),
@@ -168,6 +169,12 @@ def test_written_settings_read_back_the_same(tmp_path, monkeypatch):
 )
 def test_values_after_an_option_belong_to_it(given, expected):
     assert spread_values(given, "--test") == expected
+
+
+def test_a_name_after_a_joined_value_is_not_guessed_to_be_a_training_run() -> None:
+    for given in (["--test=b", "c"], ["a", "--test", "b", "--test=c", "d"]):
+        with pytest.raises(InputError, match=r"write '--test . .' if it does, else name it before --test"):
+            spread_values(given, "--test")
 
 
 def kinds_of_settings() -> list[type[Settings]]:

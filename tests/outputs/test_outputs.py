@@ -17,7 +17,7 @@ import pytest
 
 from fogml import folders, outputs
 from fogml.errors import InputError
-from fogml.locks import sole_writer
+from fogml.locks import Held, sole_writer
 from fogml.outputs import folder_to_fill, scratch_folder, settle, whole_file, whole_files, whole_folder
 
 ROOT = Path(__file__).parents[2]
@@ -232,10 +232,12 @@ def test_the_lock_of_a_dead_process_is_taken_over(tmp_path, monkeypatch):
         assert not lock.exists()
     # On a file system without locks there is only what the file states.
     monkeypatch.setattr("fogml.locks._locked", lambda handle, wait: False)
+    who = f"process {os.getpid()} on {here}"
     for text in ("", "garbage", json.dumps({**gone, "host": here})):
         lock.write_text(text)
-        with sole_writer(out), pytest.raises(InputError, match=f"process {os.getpid()} on"), sole_writer(out):
+        with sole_writer(out), pytest.raises(Held, match=who) as held, sole_writer(out):
             raise AssertionError
+        assert held.value.who == who
     lock.write_text(json.dumps({**gone, "host": "elsewhere"}))
     who = r"process 999999999 on elsewhere .* remove .*\.out\.lock"
     with pytest.raises(InputError, match=who), sole_writer(out):

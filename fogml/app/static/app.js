@@ -160,8 +160,8 @@ async function showLine() {
   try {
     const told = await ask("POST", "/api/command", { command: state.command, values: valuesNow() });
     if (mine !== asked) return;
-    byId("line").textContent = told.line || told.fault;
-    byId("line").className = told.fault ? "bad" : "";
+    byId("line").textContent = told.line || "";
+    byId("lacking").textContent = told.fault || "";
     byId("run").disabled = Boolean(told.fault);
   } catch (error) { if (mine === asked) fault(error.message); }
 }
@@ -175,11 +175,11 @@ async function run() {
     fault("");
     await refresh();
   } catch (error) { fault(error.message); }
-  byId("run").disabled = false;
+  showLine();
 }
 
 // Jobs -------------------------------------------------------------------------------------------------------
-const STATES = { waiting: "waits", running: "runs", done: "done", limit: "done, a limit is not met", refused: "bad input", cancelled: "cancelled", failed: "failed" };
+const STATES = { waiting: "waits", running: "runs", done: "done", limit: "done, not all is well", refused: "bad input", cancelled: "cancelled", failed: "failed" };
 
 function drawJobs() {
   byId("none").hidden = state.jobs.length > 0;
