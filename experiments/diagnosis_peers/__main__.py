@@ -28,7 +28,6 @@ from fogml.blind.methods import load_method
 from fogml.blind.score import marks_of
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.truth import read_truth
-from fogml.numerals import MISSING
 from fogml.report.benchmark_page import share_text, value_text
 
 HERE = Path(__file__).parent
@@ -178,10 +177,6 @@ def _by_reality(values: Mapping[str, Any]) -> str:
             cells.append(" / ".join(told))
         lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines)
-
-
-def _hits(share: Mapping[str, Any]) -> str:
-    return MISSING if share["value"] is None else f"{round(share['value'] * share['n'])} of {share['n']}"
 
 
 def main() -> None:

@@ -14,7 +14,6 @@ from fogml.features.own import Function, declare
 bend = declare(Function(name="bend", parameters=("x",), function=lambda x, w: w * x / (w + abs(x))))
 number = 3
 """
-POINT = "entry point 'mine' of fogml-bends in group 'fogml.operators'"
 CODE = """
 from fogml.errors import InputError
 from fogml.features.parse import parse_features

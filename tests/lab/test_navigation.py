@@ -55,6 +55,8 @@ def test_constant_drift_is_what_the_full_equations_give(axis: str) -> None:
     east = y[12] * EARTH_RADIUS_M * np.cos(np.radians(latitude))
     np.testing.assert_allclose(told.east_m, east, atol=2e-3)
     np.testing.assert_allclose(told.heading_deg, np.degrees(np.arctan2(y[3], y[0])), atol=1e-8)
+    np.testing.assert_allclose(told.velocity_m_s, np.hypot(y[9], y[10]), atol=1e-6)
+    np.testing.assert_allclose(told.tilt_deg, np.degrees(np.hypot(y[2], y[5])), atol=1e-9)
     assert told.position_m.max() > 10.0
 
 
