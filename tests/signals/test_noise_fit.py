@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import kstest
 
 from fogml.errors import InputError
-from fogml.signals.noise_fit import NoisePrior, _curvature, _log_likelihood, _moments, fit_noise
+from fogml.signals.noise_fit import NoisePrior, _curvature, _glance, _log_likelihood, _moments, fit_noise
 from fogml.signals.noise_fit_data import fit_data
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.random_noise import flicker_noise, random_walk, white_noise
@@ -158,3 +158,15 @@ def test_moments_of_a_normal_posterior_are_its_own():
     assert 32.0 < matter <= 64.0
     away, steps = np.array([2.0, 1.0]), np.array([1e-2, 2e-2])
     assert _curvature(loss, away, steps) == pytest.approx(inverse, rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "factor"), [("N", 1.0), ("K", 0.5)])
+def test_the_prior_at_a_glance_is_about_the_noise_where_it_reigns(name, factor):
+    rng = np.random.default_rng(3)
+    makes = {
+        "N": lambda: white_noise(rng, 64, 10.0, 60 * TRUTH.N),
+        "K": lambda: random_walk(rng, 64, 10.0, TRUTH.K / 60),
+    }
+    series = [makes[name]() for _ in range(60)]
+    centre = _glance(fit_data([10.0 * np.arange(64)] * 60, series, None, None, 512)).centre
+    assert getattr(centre, name) == pytest.approx(factor * getattr(TRUTH, name), rel=0.15)

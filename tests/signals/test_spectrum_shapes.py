@@ -32,6 +32,14 @@ def test_half_the_power_passes_a_running_mean_at_its_corner(order: int, corner: 
     assert OutputFilter("mean", 100).corner_cycles(0.0) == pytest.approx(0.44295 / 100, rel=1e-4)
 
 
+@pytest.mark.parametrize("low_pass", LOW_PASSES, ids=str)
+def test_a_low_pass_is_named_by_the_slope_of_its_skirt(low_pass: OutputFilter) -> None:
+    corner = np.log(1e-6)
+    skirt = [low_pass.response(np.array([x]), corner)[0][0] for x in (1e-3, 2e-3)]
+    order = round(np.log2(skirt[0] / skirt[1]) / 2)  # power falls by 2 orders of frequency a stage
+    assert low_pass.words() == f"low pass of {['no', 'first', 'second'][order]} order"
+
+
 @pytest.mark.parametrize("sample_s", [0.01, 1.0])
 @pytest.mark.parametrize("samples", [0.5, 3.0, 50.0, 1e5])
 def test_what_is_correlated_is_the_sum_of_what_folds_back(sample_s: float, samples: float) -> None:

@@ -27,6 +27,14 @@ def test_noise_that_grows_is_seen_with_its_size():
     assert found.thirds[2] / found.thirds[0] == pytest.approx(1.5, rel=0.15)
 
 
+@pytest.mark.parametrize("unit", [2.0**-30, 2.0**30])
+def test_the_unit_of_the_values_does_not_matter(unit):
+    growing = np.random.default_rng(2).normal(size=3000) * np.linspace(1.0, 1.3, 3000)
+    one, other = (stationarity([y], 0.1) for y in (growing, unit * growing))
+    assert other.p_value == pytest.approx(one.p_value, rel=1e-9) and one.p_value < 1.0
+    assert (other.tau_s, other.thirds) == (one.tau_s, one.thirds)
+
+
 def test_too_short_to_tell():
     assert stationarity([np.arange(20.0)], 1.0).tau_s is None
 
