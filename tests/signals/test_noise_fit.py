@@ -170,3 +170,18 @@ def test_the_prior_at_a_glance_is_about_the_noise_where_it_reigns(name, factor):
     series = [makes[name]() for _ in range(60)]
     centre = _glance(fit_data([10.0 * np.arange(64)] * 60, series, None, None, 512)).centre
     assert getattr(centre, name) == pytest.approx(factor * getattr(TRUTH, name), rel=0.15)
+
+
+def test_one_coefficient_is_told_as_its_posterior_integrates():
+    """A normal prior of ln N beside n - 1 squares of white noise about their mean."""
+    count, centre, factor = 16, 0.003, 1.2
+    y = 3.0 * white_noise(np.random.default_rng(2), count, 10.0, 60 * centre)
+    fit = fit_noise([10.0 * np.arange(count)], [y], prior=NoisePrior(NoiseModel(centre, 0.0, 0.0), factor))
+    off = np.linspace(-2.0, 2.0, 4001)
+    sigma = 60.0 * centre * np.exp(off) / np.sqrt(10.0)
+    squares = float(np.sum((y - y.mean()) ** 2))
+    log = -0.5 * (off / np.log(factor)) ** 2 - (count - 1) * np.log(sigma) - 0.5 * squares / sigma**2
+    share = np.exp(log - log.max()) / np.exp(log - log.max()).sum()
+    mean = float(share @ off)
+    assert np.log(fit.model.N / centre) == pytest.approx(mean, abs=5e-3)
+    assert fit.standard_errors[0] == pytest.approx(np.sqrt(share @ (off - mean) ** 2), rel=0.03)
