@@ -80,6 +80,12 @@ class Symbol:
     def __ge__(self, other: Any) -> Symbol:
         return self.writer.line("{} >= {}", self, other, kind="bool")
 
+    def __eq__(self, other: Any) -> Symbol:  # type: ignore[override]
+        return self.writer.line("{} == {}", self, other, kind="bool")
+
+    def __ne__(self, other: Any) -> Symbol:  # type: ignore[override]
+        return self.writer.line("{} != {}", self, other, kind="bool")
+
     def __and__(self, other: Any) -> Symbol:
         return self.writer.line("{} && {}", self, other, kind="bool")
 

@@ -63,6 +63,17 @@ TWO_TIMES = Recursion(
     time_constant=0,
     gain=2.0,
 )
+COMPARED = Recursion(
+    name="compared",
+    parameters=("x",),
+    start=lambda x, a: (0.0, x),
+    step=lambda s, x, last, dt, a: (
+        where(x == last, smaller(s[0] + dt, 20.0), 0.0),
+        where((x != last) & (x >= a) | (x <= -a), 40.0 / (2.0 + abs(x)), s[1]),
+    ),
+    value=lambda s, x, a: s[0] + s[1],
+    gain=10.0,
+)
 OPERATORS = "T_in, bend(T_in, 30 degC, 2), fold(T_out, 15 degC), creep(T_in-T_out, 300 s), peak(T_out)"
 TEXT = f"{OPERATORS}, dT_in[hann, 60 s], diff(T_out)[line, 40 s]"
 
@@ -125,6 +136,22 @@ def test_their_c_gives_what_compensate_gives(tmp_path, text, dtype, bound):
     np.testing.assert_allclose(out, expected.compensated, atol=bound)
     assert np.count_nonzero(flag[1:] != expected.flag[1:]) <= (0 if dtype == "float64" else 2)
     assert set(flag.tolist()) == {1, 2}  # never as slow as in training
+
+
+@needs_cc
+@pytest.mark.parametrize(("dtype", "bound"), [("float64", 1e-9), ("float32", 1e-4), ("q31", 2e-3)])
+def test_every_comparison_is_the_same_in_c(tmp_path, dtype, bound):
+    """Of readings in steps of a quarter of a degree, which all formats hold, some of them the same again."""
+    declare(COMPARED)
+    time = np.arange(0.0, 4000.0, 2.0)
+    T = np.round(4.0 * (5.0 + 20.0 * np.sin(time / 500.0) + 3.0 * np.sin(time / 60.0))) / 4.0
+    run = Run("steps", {"time": time, "gyro": 0.1 * np.sin(time), "T_in": T, "T_out": T})
+    model = make_model("polynomial", features="T_in, compared(T_in, 12 degC)").fit(run)
+    source = c_source(Plan.of(model), dtype, [])
+    out, _ = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
+    columns = parse_features("compared(T_in, 12 degC)").transform(run)[:, 0]
+    assert np.any((T[1:] == T[:-1]) & (columns[1:] > 5.0)) and np.ptp(columns) > 10.0
+    np.testing.assert_allclose(out, model.compensate(run).compensated, atol=bound)
 
 
 @needs_cc
