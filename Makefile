@@ -5,8 +5,8 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 # All that the tests use but 'dataflash': its package unpacks to 93 MB, most of the time of an installation.
 EXTRAS := xlsx,tdms,mdf,ulog,ros,mcap,miniseed,sweep,cluster,export,test
-# Two workers share two cores: threads of their own would wait for each other.
-TESTED := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+# Two workers share two cores: threads of their own would wait for each other. What tests start is compiled once.
+TESTED := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 INSTALL := $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
 
 .PHONY: demo test oldest newest docs lint format benchmarks clean
