@@ -179,7 +179,7 @@ def write_gap(folder: Path, found: Diagnosis) -> None:
     write_json(folder / "gap.json", found.as_dict())
     (folder / "gap.html").write_text(gap_page(found), encoding="utf-8")
     if found.counterfactuals:
-        from fogml.report.counterfactual_page import counterfactual_page
+        from fogml.report.gap_page import counterfactual_page
 
         (folder / WHAT_IF).write_text(counterfactual_page(found), encoding="utf-8")
     if found.separating_run is not None:

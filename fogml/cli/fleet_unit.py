@@ -116,7 +116,7 @@ class UnitWork:
     def _acceptance(self, unit: Unit, folder: Path) -> dict[str, Any]:
         """The report of the test runs, before and after a model of the training runs, if there are any."""
         from fogml.cli.lab import AcceptanceSettings
-        from fogml.cli.lab_acceptance_job import write_report
+        from fogml.cli.lab_jobs import write_report
         from fogml.cli.runs import open_runs
         from fogml.lab.acceptance import ACCEPTED, NO_LIMITS
         from fogml.models.names import make_model

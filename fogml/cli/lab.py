@@ -161,7 +161,7 @@ class AcceptanceSettings(Settings):
     acceptance.xlsx and lab-acceptance.config.yaml. Exit status 1 if a limit is missed or not tested.
     """
 
-    job: ClassVar[str] = "fogml.cli.lab_acceptance_job:acceptance_and_write"
+    job: ClassVar[str] = "fogml.cli.lab_jobs:acceptance_and_write"
     runs: list[str] = placed([], "RUN...", "Runs of one unit and axis.", **options.RUN)
     model: str | None = setting(
         None, "Folder of the unit's model.", metavar="DIR", reads=True, lost=options.LOST_MODEL
@@ -185,7 +185,7 @@ class BatchSettings(Settings):
     is not accepted.
     """
 
-    job: ClassVar[str] = "fogml.cli.lab_acceptance_job:batch_and_write"
+    job: ClassVar[str] = "fogml.cli.lab_jobs:batch_and_write"
     reports: list[str] = placed(
         [],
         "REPORT...",

@@ -126,7 +126,7 @@ def _expected_rows(run: str) -> float | None:
     """About how many rows a file holds, for the time left; None where that would take reading it."""
     path = Path(run)
     if path.suffix.lower() == ".parquet" and path.is_file():
-        from fogml.runs.parquet_files import parquet_rows
+        from fogml.runs.column_files import parquet_rows
 
         return float(parquet_rows(path))
     if path.suffix.lower() not in (".csv", ".txt") or not path.is_file():

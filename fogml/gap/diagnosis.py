@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals
-from fogml.gap.causes import found_cause
+from fogml.gap.causes import cause_shares, energy, found_cause
 from fogml.gap.compensation import compensation_of
 from fogml.gap.fitted_model import Explained, explained
 from fogml.gap.how_far import Foretold, HeldOut
@@ -31,7 +31,6 @@ from fogml.gap.reports import (
 from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.result_parts import Nearest, WhatIf
 from fogml.gap.settings import STANDARD, Priors
-from fogml.gap.shares import cause_shares, energy
 from fogml.gap.where import GapOnRun, where
 from fogml.processes import one_thread
 from fogml.runs.names import named_apart

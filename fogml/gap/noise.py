@@ -23,7 +23,7 @@ from fogml.gap.step_settings import NoiseSettings
 from fogml.gap.unknown import unknown_families
 from fogml.intervals import Z50
 from fogml.runs.run import Run
-from fogml.runs.thermal_columns import leading_temperature
+from fogml.runs.thermometers import leading_temperature
 from fogml.runs.turning import turning
 from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior, fit_noise
 from fogml.signals.noise_model import NoiseModel

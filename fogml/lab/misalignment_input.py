@@ -24,11 +24,11 @@ from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_segments import Rows, from_marks, from_rates, from_samples
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, stated
+from fogml.runs.column_files import parquet_marks
 from fogml.runs.columns import conversion, parse_header
 from fogml.runs.csv_dialect import csv_dialect
 from fogml.runs.facts import read_side_file, side_file
 from fogml.runs.opening import opened
-from fogml.runs.parquet_files import parquet_marks
 from fogml.runs.raw_table import RawTable
 from fogml.runs.reading import read_table
 

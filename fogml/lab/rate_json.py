@@ -32,7 +32,7 @@ from fogml.runs.findings import of_any_use
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.runs.settling import LEAST_ROWS
-from fogml.runs.thermal_columns import leading_temperature
+from fogml.runs.thermometers import leading_temperature
 from fogml.twin.coil import LayeredCoil, lead_sensitivity, midpoint_sensitivity, radial_sensitivity
 from fogml.twin.twin import Twin
 from fogml.validation.scale_factor import LEAST_LEVELS

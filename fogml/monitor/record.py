@@ -20,7 +20,7 @@ from fogml.monitor.figures import Averages, run_figures
 from fogml.runs.checks import spoiling
 from fogml.runs.findings import OF_OUTPUT, OF_TEMPERATURE, SPOILING, dead_words
 from fogml.runs.run import Run
-from fogml.runs.thermal_columns import leading_temperature
+from fogml.runs.thermometers import leading_temperature
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
 from fogml.signals import large

@@ -12,14 +12,13 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted
 from fogml.numerals import short
-from fogml.runs.coarse_output import coarse_output
 from fogml.runs.findings import DEAD, SATURATION, Finding, dead_words
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
 from fogml.runs.run import Run
+from fogml.runs.steps import coarse_output
 from fogml.runs.stuck import stuck
-from fogml.runs.thermal_columns import leading_temperature
-from fogml.runs.thermometers import coarse, resolution, spiked
+from fogml.runs.thermometers import coarse, leading_temperature, resolution, spiked
 from fogml.runs.turning import turning
 from fogml.signals import large
 

@@ -237,6 +237,11 @@ def header(name: str, unit: str | None = None) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
+def stated_cell(name: str, unit: str | None) -> str:
+    """The header cell of a column whose unit, if any, is stated beside its name."""
+    return name if unit is None else f"{parse_header(name)[0]} [{unit.strip()}]"
+
+
 def conversion(name: str, unit: str | None, file: str) -> tuple[float, float]:
     """Factor and offset that bring a column to its internal unit.
 

@@ -16,7 +16,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, listed, printable, quoted
 from fogml.readers import reader_of
-from fogml.runs.columns import column_spec, parse_header
+from fogml.runs.columns import column_spec, parse_header, stated_cell
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.other_rate import Beside, clock_s, held_beyond, interpolated, is_held
@@ -107,8 +107,7 @@ def _cells(kind: str, group: str, arrays: Sequence[StoredArray], rotations: int)
             axis = _AXIS_OF_CODE.get(code[1])
             cells.append("gyro [count]" if rotations == 1 or axis is None else f"gyro_{axis} [count]")
         else:
-            stated = array.name if array.unit is None else f"{parse_header(array.name)[0]} [{array.unit}]"
-            cells.append(known.get(array.name, stated))
+            cells.append(known.get(array.name, stated_cell(array.name, array.unit)))
     return cells
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.runs.thermal_columns import thermal_columns
+from fogml.runs.thermometers import thermal_columns
 from fogml.signals import large
 from fogml.signals.noise_spectrum import Rows, Spectrum, spectrum_of
 

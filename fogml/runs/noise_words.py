@@ -11,10 +11,9 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.intervals import Z90
 from fogml.numerals import percent, short
-from fogml.runs.coarse_output import hardly_moved
 from fogml.runs.noise_series import HOLD_ROWS, NoiseSeries
 from fogml.runs.run import Run
-from fogml.runs.steps import recorded_step
+from fogml.runs.steps import hardly_moved, recorded_step
 from fogml.signals.distributions import chi2_sf
 from fogml.signals.noise_terms import NoiseTerms
 from fogml.signals.whiteness import Stationarity

@@ -173,7 +173,7 @@ class Opened:
         """What it holds, unpacked where it tells [MB]."""
         size = float(self.path.stat().st_size)
         if self.kind == "parquet":
-            from fogml.runs.parquet_files import parquet_values
+            from fogml.runs.column_files import parquet_values
 
             size = max(size, 8.0 * parquet_values(self.path))
         return size / 1e6

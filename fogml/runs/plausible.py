@@ -16,8 +16,7 @@ from fogml.intervals import SIGMA_PER_MEDIAN
 from fogml.numerals import short
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
-from fogml.runs.turning import turning
-from fogml.runs.unrecorded_turns import implausible_rest
+from fogml.runs.turning import implausible_rest, turning
 from fogml.signals import large
 
 HOUR_S = 3600.0

@@ -233,18 +233,10 @@ def _table_blocks(
         from fogml.runs.csv_files import csv_blocks
 
         return map(file.keeping, csv_blocks(path, rows or BLOCK_ROWS, columns, file.durations))
-    if kind == "parquet":
-        from fogml.runs.parquet_files import parquet_blocks
+    if kind in ("parquet", "hdf5", "mat"):
+        from fogml.runs.column_files import BLOCKS
 
-        return parquet_blocks(path, rows, columns, limits)
-    if kind == "hdf5":
-        from fogml.runs.hdf5_files import hdf5_blocks
-
-        return hdf5_blocks(path, rows, columns, limits)
-    if kind == "mat":
-        from fogml.runs.hdf5_files import mat_blocks
-
-        return mat_blocks(path, rows, columns, limits)
+        return BLOCKS[kind](path, rows, columns, limits)
     from fogml.runs.container_files import container_blocks
 
     return container_blocks(path, kind, rows, columns, limits)

@@ -53,11 +53,11 @@ def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | 
     _check_finite(path, {cell: run.columns[name] for name, cell in cells.items()}, carried_cells(run))
     with _with_side_file(path, run.facts) as partial:
         if suffix == ".mat":
-            from fogml.runs.hdf5_files import write_mat
+            from fogml.runs.column_files import write_mat
 
             write_mat(run, cells, partial, mat_version)
         else:
-            from fogml.runs.hdf5_files import write_hdf5
+            from fogml.runs.column_files import write_hdf5
 
             write_hdf5(run, cells, partial)
 

@@ -28,8 +28,8 @@ from fogml.signals.clock import check_interval
 from fogml.signals.distributions import students_ppf
 from fogml.signals.noise_spectrum import Rows, spectrum_of
 from fogml.signals.output_filters import SpectrumTerms
-from fogml.signals.slow_noise import slow_fits
 from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel
+from fogml.signals.term_intervals import slow_fits
 
 _SPIKE = 8.0
 """A sample, or a step of the sub-averages, further than this many standard deviations is no noise."""

@@ -17,9 +17,8 @@ from fogml.signals.clock import check_interval
 from fogml.signals.noise_search import NoiseSearch, search_noise
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 from fogml.signals.output_filters import AFTER, term_shapes
-from fogml.signals.slow_noise import ramp
 from fogml.signals.spectrum_fit import SpectrumFit
-from fogml.signals.term_intervals import term_interval
+from fogml.signals.term_intervals import ramp, term_interval
 
 TermName = Literal["Q", "N", "B", "K", "R"]
 

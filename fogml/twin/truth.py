@@ -10,8 +10,8 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.runs.column_files import parquet_blocks
 from fogml.runs.columns import header, parse_header
-from fogml.runs.parquet_files import parquet_blocks
 
 _PART = "contribution of "
 _DRIVE_UNITS = {"heading": "deg", "shaking": "1", "dose": "Gy"}

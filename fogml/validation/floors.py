@@ -15,7 +15,7 @@ from fogml.numerals import percent, short
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.noise_series import rows_at_rest, sample_interval
 from fogml.runs.run import Run
-from fogml.runs.thermal_columns import thermal_columns
+from fogml.runs.thermometers import thermal_columns
 from fogml.signals import large
 from fogml.signals.clock import gap_starts, longest_gap_s
 from fogml.signals.distributions import chi2_ppf

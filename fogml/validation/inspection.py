@@ -12,7 +12,7 @@ from fogml.json_files import finite_json
 from fogml.runs.columns import column_spec
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
-from fogml.runs.thermal_columns import leading_temperature
+from fogml.runs.thermometers import leading_temperature
 from fogml.signals import large
 from fogml.signals.averages import block_averages
 

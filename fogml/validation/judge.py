@@ -16,7 +16,7 @@ from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
-from fogml.runs.thermal_columns import leading_temperature
+from fogml.runs.thermometers import leading_temperature
 from fogml.signals.averages import AVERAGING_S
 from fogml.signals.floor import Floor
 from fogml.validation.floors import check_noise_run, floor_of_run, out_of_reach

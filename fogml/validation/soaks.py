@@ -17,7 +17,7 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.runs.temperature_motion import LEAST_TRAVEL_DEGC
-from fogml.runs.thermal_columns import leading_temperature
+from fogml.runs.thermometers import leading_temperature
 
 ROOM_TEMPERATURE_DEGC = 25.0
 LEAST_DIFFERENCE_DEGC = 5.0

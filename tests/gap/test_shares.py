@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fogml.gap.causes import energy, shapley_values
 from fogml.gap.field import Member
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import foreseen
 from fogml.gap.model import TwinModel
 from fogml.gap.settings import STANDARD
-from fogml.gap.shares import energy, shapley_values
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin_file import load_twin

@@ -17,7 +17,7 @@ from fogml.report import (
     noise_page,
     train_page,
 )
-from fogml.report.counterfactual_page import counterfactual_page
+from fogml.report.gap_page import counterfactual_page
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run

@@ -8,7 +8,7 @@ import pytest
 from fogml.runs.checks import check_run
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
-from fogml.runs.unrecorded_turns import CODE
+from fogml.runs.turning import CODE
 
 TIME = np.arange(0.0, 3600.0, 0.5)
 NOISE = np.random.default_rng(0).normal(0.0, 5.0, len(TIME))

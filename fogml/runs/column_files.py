@@ -1,7 +1,10 @@
-"""HDF5 and MATLAB files: one dataset or vector per column, at the top or in a group or struct ``run``.
+"""Parquet, HDF5 and MATLAB files: one dataset or vector per column, or in a group or struct ``run``.
 
-A dataset is named ``name [unit]``, or ``name`` with an attribute ``unit``. Set-up facts are attributes of
-the same group: JSON in ``fogml.facts``, as `write_run` puts them, or one attribute per fact. With h5py::
+In Parquet columns are named ``name [unit]``. Set-up facts stand in the schema's metadata: JSON under
+``fogml.facts``, as `write_run` puts them, or one key per fact.
+
+An HDF5 dataset is named ``name [unit]``, or ``name`` with an attribute ``unit``. Set-up facts are attributes
+of the same group, as those of Parquet. With h5py::
 
     with h5py.File("run.h5", "w") as file:
         file["time [s]"], file["gyro [deg/h]"], file["T_in [degC]"] = time, gyro, temperature
@@ -23,13 +26,15 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogml.errors import InputError, install_words, listed, quoted
-from fogml.runs.columns import column_spec, parse_header
+from fogml.runs.columns import column_spec, parse_header, stated_cell
 from fogml.runs.container_files import Group, grouped, unknown_fields
 from fogml.runs.facts import Facts, facts_from
 from fogml.runs.findings import Finding
@@ -40,7 +45,9 @@ from fogml.runs.raw_table import (
     choose_vectors,
     embedded_facts,
     facts_from_json,
+    moment,
     stored_blocks,
+    text_column,
 )
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
@@ -72,16 +79,10 @@ def hdf5_blocks(
     with stored_file(path, "hdf5", (FACTS_KEY, *Facts.model_fields), limits) as stored:
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'")
-        vectors, findings = choose_vectors(
-            path.name,
-            list(zip(canonical_cells([_cell_of(a) for a in stored.arrays]), stored.arrays, strict=True)),
-        )
+        cells = canonical_cells([stated_cell(array.name, array.unit) for array in stored.arrays])
+        vectors, findings = choose_vectors(path.name, list(zip(cells, stored.arrays, strict=True)))
         facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the attributes")
         yield from stored_blocks(stored, vectors, findings, facts, rows, columns)
-
-
-def _cell_of(array: StoredArray) -> str:
-    return array.name if array.unit is None else f"{parse_header(array.name)[0]} [{array.unit}]"
 
 
 def write_hdf5(run: Run, cells: dict[str, str], path: Path) -> None:
@@ -145,13 +146,12 @@ def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> tuple[G
 
     What others hold of a run is said: whether their clocks go with that one nobody can tell.
     """
-    groups = [
-        Group(
-            name,
-            tuple(zip(canonical_cells([_cell(a.name, a.unit or units.get(a.name)) for a in held]), held)),
+    groups = []
+    for name, held in grouped(stored).items():
+        cells = canonical_cells(
+            [stated_cell(array.name, array.unit or units.get(array.name)) for array in held]
         )
-        for name, held in grouped(stored).items()
-    ]
+        groups.append(Group(name, tuple(zip(cells, held))))
     runs = [group for group in groups if group.is_run]
     # What stands at the top comes before what else is kept.
     runs = [group for group in runs if not group.name] or runs
@@ -164,16 +164,12 @@ def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> tuple[G
     if not runs and len(groups) > 1:
         raise unknown_fields(path, "mat", groups)
     chosen = (runs or groups)[0]
-    held = [(group.name, name) for group in groups for name in group.names if group is not chosen]
-    unread = [f"{of}/{name}" if of else name for of, name in held if name != "time" and column_spec(name)]
+    others = [(group.name, name) for group in groups for name in group.names if group is not chosen]
+    unread = [f"{of}/{name}" if of else name for of, name in others if name != "time" and column_spec(name)]
     if not unread:
         return chosen, ()
     told = f"not read, as of other structs: {listed(map(quoted, unread))}; an import profile reads them"
     return chosen, (Finding("other_columns", told, count=len(unread)),)
-
-
-def _cell(name: str, unit: str | None) -> str:
-    return name if unit is None else f"{parse_header(name)[0]} [{unit.strip()}]"
 
 
 def write_mat(
@@ -223,3 +219,63 @@ def _write_text(group: Any, name: str, text: str) -> None:
     dataset = group.create_dataset(name, data=codes)
     dataset.attrs["MATLAB_class"] = np.bytes_("char")
     dataset.attrs["MATLAB_int_decode"] = np.int32(2)
+
+
+def parquet_blocks(
+    path: Path,
+    rows: int | None,
+    columns: Collection[str] | None = None,
+    limits: ReadingLimits = DEFAULT_LIMITS,
+) -> Iterator[RawTable]:
+    """The table of a Parquet file in blocks of at most `rows` rows, in bounded memory; whole for None.
+
+    Only time, gyro and `columns` are read where these are given.
+    """
+    with stored_file(path, "parquet", (FACTS_KEY, *Facts.model_fields), limits) as stored:
+        vectors, findings = [], []
+        for array in stored.arrays:
+            name = parse_header(array.name)[0]
+            if array.kind == "f":
+                vectors.append((stated_cell(array.name, array.unit), array))
+            elif column_spec(name) is not None:
+                raise InputError(
+                    f"{path.name}, column '{name}': holds {array.type_name}, numbers were expected"
+                )
+            else:
+                findings.append(text_column(name))
+        facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the metadata")
+        cells = canonical_cells([cell for cell, _ in vectors])
+        vectors = [(cell, array) for cell, (_, array) in zip(cells, vectors, strict=True)]
+        clock = next((array for cell, array in vectors if parse_header(cell)[0] == "time"), None)
+        started = None if clock is None else moment(stored.told["origins_s"][clock.index])
+        for table in stored_blocks(stored, vectors, tuple(findings), facts, rows, columns):
+            yield replace(table, started=started)
+
+
+def parquet_rows(path: Path) -> int:
+    """Number of rows of a Parquet file."""
+    with stored_file(path, "parquet", (), DEFAULT_LIMITS) as stored:
+        return max((max(array.shape) for array in stored.arrays), default=0)
+
+
+def parquet_values(path: Path) -> int:
+    """Number of values of a Parquet file, in all its columns."""
+    with stored_file(path, "parquet", (), DEFAULT_LIMITS) as stored:
+        return sum(max(array.shape) for array in stored.arrays)
+
+
+def parquet_marks(path: Path, cell: str) -> NDArray[np.str_]:
+    """The texts of a column of marks, shape (n,), by its header cell."""
+    with stored_file(path, "parquet", (), DEFAULT_LIMITS) as stored:
+        return stored.marks(_named(stored, cell))
+
+
+def _named(stored: StoredFile, cell: str) -> StoredArray:
+    found = [array for array in stored.arrays if array.name == cell]
+    if not found:
+        raise InputError(f"{stored.path.name}: column '{cell}' is missing; export it again")
+    return found[0]
+
+
+BLOCKS = {"parquet": parquet_blocks, "hdf5": hdf5_blocks, "mat": mat_blocks}
+"""What reads each format, by its name."""
