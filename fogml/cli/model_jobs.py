@@ -251,10 +251,12 @@ def _print_export(
         ["number format", report["dtype"]],
         ["weights", f"{report['bytes_weights']} bytes"],
         [
-            "largest difference in the trained box",
+            "largest difference measured in the trained box",
             f"{short(difference, 2)} deg/h (allowed {short(tolerance, 2)})",
         ],
     ]
+    if (proven := report.get("fixed_point", {}).get("largest_difference_proven")) is not None:
+        rows.append(["fixed point there, by proof", f"at most {short(proven, 2)} deg/h"])
     if report["operations_per_sample"] is not None:
         rows.append(["operations per sample", str(report["operations_per_sample"])])
     if pruning := report.get("pruning"):

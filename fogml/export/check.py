@@ -14,9 +14,19 @@ from fogml.arrays import FloatArray
 from fogml.export.c_program import FLAGS, CProgram
 from fogml.export.c_source import CSource
 from fogml.export.plan import Plan
-from fogml.export.points import POINTS, History, box_points, history
+from fogml.export.points import (
+    POINTS,
+    History,
+    box_points,
+    history,
+    largest_in_box,
+    output_size,
+    recorded_history,
+)
+from fogml.export.self_test import sensor_range
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel
+from fogml.runs.run import Run
 
 READING_STEP_DEGC = 1.0 / 16.0
 """Steps of a thermometer in use, a DS18B20's, in which a history is read where windows are held in bins."""
@@ -85,62 +95,99 @@ def plan_error(plan: Plan, model: DriftModel, seed: int) -> float:
     return float(np.max(np.abs(value - (run.gyro_deg_h - evaluation.drift))))
 
 
-def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> Difference:
-    """Difference of generated C from a plan, at points and over a history with gaps."""
+def c_difference(
+    plan: Plan, source: CSource, program: CProgram, seed: int, recorded: Sequence[Run] = ()
+) -> Difference:
+    """Difference of generated C from a plan: in the box, over a history with gaps, and over recorded runs.
+
+    Inside is the trained box, slices apart, which a history seldom keeps to. Recorded runs show what clocks,
+    lost samples and thermometers of their own make of windows.
+    """
     fixed = source.numbers["fixed"]
-    gyro_step = float(fixed["gyro_value"]) if fixed else 0.0
-    past = history(plan, seed)
-    gyro = past.gyro
-    if fixed and plan.gives_rate and plan.gyro_unit == "count":
-        # Counts are whole; what whole steps of temperatures and outputs lose is part of the difference.
-        gyro = np.round(gyro / gyro_step) * gyro_step
-    past = replace(past, gyro=gyro)
-    off, flags, told = _over_history(plan, source, program, past)
-    inside, outside = _largest(off[flags != 1]), _largest(off[flags == 1])
-    count, good = len(off), int(np.count_nonzero(flags == 0))
-    differ = int(np.count_nonzero(told != flags))
+    gyro_step = float(fixed["gyro_value"]) if fixed and plan.gyro_unit == "count" else 0.0
+    past = _with_outputs(plan, history(plan, seed), gyro_step)
+    off, flags, told, boxed = _over_history(plan, source, program, past)
+    inside, outside = _largest(off[boxed != 1]), _largest(off[boxed == 1])
+    others = [_with_outputs(plan, recorded_history(plan, run, seed), gyro_step) for run in recorded]
     if source.layout.binned and all(atom.operator != "sign" for atom in plan.atoms):
         # Bins take samples for evenly rising, which a thermometer that shows steps does not. Of a soak's
         # direction steps leave nothing to compare.
-        off, flags, _ = _over_history(plan, source, program, past.in_steps(plan, READING_STEP_DEGC))
-        inside, outside = max(inside, _largest(off[flags == 0])), max(outside, _largest(off[flags == 1]))
+        others.append(past.in_steps(plan, READING_STEP_DEGC))
+    for other in others:
+        more, _, _, where = _over_history(plan, source, program, other)
+        inside, outside = max(inside, _largest(more[where == 0])), max(outside, _largest(more[where == 1]))
+    good, differ = int(np.count_nonzero(flags == 0)), int(np.count_nonzero(told != flags))
     if not plan.atoms:
-        return Difference(inside, outside, 0, count, good, differ)
-    near = _atoms_off(plan, source, program, box_points(plan, seed), gyro[0])
-    far = _atoms_off(plan, source, program, box_points(plan, seed, _BEYOND), gyro[0])
-    ppm = None
+        return Difference(inside, outside, 0, len(off), good, differ)
+
+    rng, steps = np.random.default_rng([seed, 4]), _reading_steps(plan, source)
+
+    def at(gyro: float, beyond: float = 0.0) -> float:
+        gyro = float(np.round(gyro / gyro_step) * gyro_step) if gyro_step else gyro
+
+        def off(atoms: FloatArray) -> FloatArray:
+            read = atoms + rng.choice([-0.5, 0.5], (len(atoms), len(steps))) @ steps
+            return _atoms_off(plan, source, program, atoms, read, gyro)
+
+        return largest_in_box(plan, off, seed, beyond)
+
+    output = output_size(plan)
+    near, far, ppm = at(output), at(output, _BEYOND), None
     if plan.gives_rate:
-        turn = float(_TURN_DEG_H / plan.arrays["scale"][0])
-        turn = float(np.round(turn / gyro_step) * gyro_step) if fixed else turn
-        ppm = 1e6 * _largest(_atoms_off(plan, source, program, box_points(plan, seed), turn)) / _TURN_DEG_H
-    return Difference(
-        max(inside, _largest(near)), max(outside, _largest(far)), POINTS, count, good, differ, ppm
-    )
+        ppm = 1e6 * at(float(_TURN_DEG_H / plan.arrays["scale"][0])) / _TURN_DEG_H
+    return Difference(max(inside, near), max(outside, far), POINTS, len(off), good, differ, ppm)
+
+
+def _with_outputs(plan: Plan, past: History, gyro_step: float) -> History:
+    """A history with outputs about its drift, as a gyro's are; whole counts of a model that takes them."""
+    if plan.gives_rate:
+        return replace(past, gyro=np.round(past.gyro / gyro_step) * gyro_step) if gyro_step else past
+    left, _ = plan.compensated(past.atoms(plan), past.gyro)
+    return replace(past, gyro=2.0 * past.gyro - left)
 
 
 def _over_history(
     plan: Plan, source: CSource, program: CProgram, past: History
-) -> tuple[FloatArray, NDArray[np.int8], NDArray[np.int32]]:
-    """How far C is from the plan over a history [deg/h], the plan's flags and those of C, each (n,)."""
-    fixed = source.numbers["fixed"]
-    expected, flags = plan.compensated(past.atoms(plan), past.gyro)
+) -> tuple[FloatArray, NDArray[np.int8], NDArray[np.int32], NDArray[np.int8]]:
+    """How far C is from the plan [deg/h], flags of both, and those of the box alone, each (n,)."""
+    fixed, atoms = source.numbers["fixed"], past.atoms(plan)
+    expected, flags = plan.compensated(atoms, past.gyro)
+    boxed = replace(plan, limits=replace(plan.limits, slices=None)).compensated(atoms, past.gyro)[1]
     if fixed is None:
         out, told = program.steps(past.time, past.temperatures, past.gyro)
-        return np.abs(out.astype(np.float64) - expected), flags, told
+        return np.abs(out.astype(np.float64) - expected), flags, told, boxed
     temperatures = np.round(past.temperatures / fixed["temperature_value"])
     out, told = program.steps(past.time, temperatures, np.round(past.gyro / fixed["gyro_value"]))
-    return np.abs(out * fixed["compensated_value"] - expected), flags, told
+    return np.abs(out * fixed["compensated_value"] - expected), flags, told, boxed
 
 
-def _atoms_off(plan: Plan, source: CSource, program: CProgram, atoms: FloatArray, gyro: float) -> FloatArray:
+def _reading_steps(plan: Plan, source: CSource) -> FloatArray:
+    """What a step of each reading moves each atom without window or memory by, shape (s, a)."""
+    fixed, steps = source.numbers["fixed"], np.zeros((len(plan.sensors), len(plan.atoms)))
+    for s, sensor in enumerate(plan.sensors):
+        low, high, _ = sensor_range(plan, sensor)
+        most = np.asarray(max(abs(low), abs(high)), dtype=None if fixed else source.dtype)
+        unit = fixed["temperature_value"] if fixed else float(np.spacing(most))
+        for a, atom in enumerate(plan.atoms):
+            if atom.operator == "value":
+                steps[s, a] = unit * dict(atom.signal.parts).get(sensor, 0.0)
+    return steps
+
+
+def _atoms_off(
+    plan: Plan, source: CSource, program: CProgram, atoms: FloatArray, read: FloatArray, gyro: float
+) -> FloatArray:
+    """How far C of atoms as they are `read` is from the plan of the `atoms` [deg/h], shape (n,)."""
     fixed = source.numbers["fixed"]
     output = np.full(len(atoms), gyro)
     everywhere = np.ones(len(atoms), dtype=np.bool_)
     expected, _ = plan.compensated(AtomValues(atoms, everywhere, everywhere), output)
+    if not plan.gives_rate:
+        output, expected = 2.0 * output - expected, output
     if fixed is None:
-        out, _ = program.atoms(atoms, output)
+        out, _ = program.atoms(read, output)
         return np.abs(out.astype(np.float64) - expected)
-    whole = np.round(atoms * 2.0 ** np.array(fixed["atom_bits"]))
+    whole = np.round(read * 2.0 ** np.array(fixed["atom_bits"]))
     out, _ = program.atoms(np.clip(whole, 1 - 2**31, 2**31 - 1), np.round(output / fixed["gyro_value"]))
     return np.abs(out * fixed["compensated_value"] - expected)
 
@@ -165,13 +212,14 @@ def value_difference(
     plan: Plan, value: Callable[[FloatArray, FloatArray], FloatArray], seed: int
 ) -> Difference:
     """Difference of a function of (feature columns, output) from a plan's drift."""
-    sizes = []
-    for beyond in (0.0, _BEYOND):
-        atoms = box_points(plan, seed, beyond)
+
+    def off(atoms: FloatArray) -> FloatArray:
         columns = plan.full_columns(atoms)
         gyro = np.full(len(atoms), 10.0 / (plan.arrays["scale"][0] if plan.gives_rate else 1.0))
-        sizes.append(_largest(np.abs(value(columns, gyro) - plan.value(columns, gyro))))
-    return Difference(sizes[0], sizes[1], POINTS)
+        return np.abs(value(columns, gyro) - plan.value(columns, gyro))
+
+    inside, outside = (largest_in_box(plan, off, seed, beyond) for beyond in (0.0, _BEYOND))
+    return Difference(inside, outside, POINTS)
 
 
 def pipeline_difference(

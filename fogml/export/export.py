@@ -63,7 +63,8 @@ def export_model(
     settings
         What is wanted.
     train
-        The model's training runs, for pruning and for the loss of accuracy on them; may be left out.
+        The model's training runs, for pruning, for the loss of accuracy on them, and for C to be compared on
+        their times and readings; may be left out.
 
     Returns
     -------
@@ -89,7 +90,8 @@ def export_model(
     plan, pruning = _pruned(whole, settings, dtype, rows)
     card = export_card(model, plan, pruning)
     if settings.to == "c":
-        report, exported = _write_c(plan, folder, dtype, card, settings.seed)
+        recorded = train if settings.sample_s in (None, model.card_.sample_s) else ()
+        report, exported = _write_c(plan, folder, dtype, card, settings.seed, recorded)
     else:
         report, exported = _write_numbers(plan, folder, dtype, settings, card, rows)
     difference: Difference = report.pop("difference")
@@ -149,7 +151,7 @@ def _pruned(
 
 
 def _write_c(
-    plan: Plan, folder: Path, dtype: str, card: dict[str, Any], seed: int
+    plan: Plan, folder: Path, dtype: str, card: dict[str, Any], seed: int, recorded: Sequence[Run]
 ) -> tuple[dict[str, Any], Plan]:
     false = false_readings(plan, seed)
     proven, flip = None, direction_flip(plan, seed)
@@ -166,7 +168,7 @@ def _write_c(
         program = CProgram(source, scratch)
         if program.self_test() != 0:
             raise InputError("export: the generated C fails its own self-test on this machine")
-        difference = c_difference(plan, source, program, seed)
+        difference = c_difference(plan, source, program, seed, recorded)
         files = {
             **source.files,
             **project_files("fogml_model"),

@@ -28,6 +28,7 @@ from fogml.export.fixed_scales import (
 )
 from fogml.export.layout import RANGE_BITS, Layout, Operator
 from fogml.export.plan import Plan
+from fogml.export.points import GYRO_DEG_H
 from fogml.features.atoms import Atom
 from fogml.features.operators import BEYOND, LAG, PLAY
 from fogml.features.traced import BITS
@@ -35,7 +36,6 @@ from fogml.numerals import short
 from fogml.signals.clock import EDGE_TOLERANCE, LEAST_SHARE, told_share
 from fogml.signals.kernel_windows import Kernel
 
-_GYRO_DEG_H = 20.0
 _HELD, _OWN = 2.0**-HELD_BITS, 2.0**-BITS
 _SHARES = np.linspace(0.01, 1.0, 1000)
 _FILLING = float(np.max(told_share(_SHARES, LEAST_SHARE) / _SHARES)) * (1.0 + 2.0**-8)
@@ -68,7 +68,7 @@ def fixed_point_error(plan: Plan, windows: Layout, dtype: str) -> float | None:
     if plan.centres:
         total += _gaussians_error(plan, scales, columns, 1 << (VALUE_BITS - scales.stored_bits))
     if plan.gives_rate:
-        most, gyro = float(scales.most[0]), _GYRO_DEG_H / abs(float(arrays["scale"][0]))
+        most, gyro = float(scales.most[0]), GYRO_DEG_H / abs(float(arrays["scale"][0]))
         step, (_, s1, s2) = 2.0**-scales.scale_bits, np.abs(arrays["scale"])
         off = step * (2.0 + most + most**2) + float(columns[0]) * (s1 + 2.0 * most * s2)
         total += gyro * off + unit
@@ -298,7 +298,7 @@ def fixed_point_lines(proven: float | None, plan: Plan, windows: Layout) -> list
         ]
     told = f"worst case    fixed point is at most {short(proven)} deg/h off in the trained box, by proof"
     if plan.gives_rate:
-        told += f" of outputs up to {_GYRO_DEG_H:g} deg/h"
+        told += f" of outputs up to {GYRO_DEG_H:g} deg/h"
     lines = [told]
     if filling:
         lines.append("              where its windows of one's own are full")

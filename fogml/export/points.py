@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,14 +14,16 @@ from fogml.export.self_test import sensor_range
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.features.own import Recursion
-from fogml.features.signal import TIME_ON
+from fogml.features.signal import TIME_ON, input_of
 from fogml.runs.columns import is_temperature
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import Run
 from fogml.signals.clock import EXPONENTIAL_SPAN
 
 POINTS = 4096
-_BEYOND = 0.2
+_NEARER, _BEST = (1.0, 0.1, 0.02, 0.004), 32
+"""Where a largest difference is looked for, round by round: within so many spans of the box about its middle,
+half of all values on its faces, then about so many points that it was largest at."""
 _LEAST_SPANS = 5.0
 """Longest windows that a history holds at least: it fills one, and another after each of its gaps."""
 _LEAST_SAMPLES, _MOST_SAMPLES = 4000, 40_000
@@ -31,20 +34,48 @@ _CROSSINGS = 8.0
 
 Two for the sweep; the walk after it, at about half of that rate and with rests, gets to most of the box.
 """
-_GYRO_DEG_H = 20.0
-"""Outputs up to this size are compared; a joint model's scale factor by a point at 10 deg/s."""
+GYRO_DEG_H = 20.0
+"""Outputs of a rate up to this size are compared; a joint model's scale factor by a point at 10 deg/s."""
 
 
 def box_points(plan: Plan, seed: int, beyond: float = 0.0, count: int = POINTS) -> FloatArray:
     """Atom values spread evenly over the trained box (n, a), or up to `beyond` spans outside it."""
     rng = np.random.default_rng([seed, 1])
+    low, high = _ends(plan, beyond)
+    return _with_directions(plan, rng.uniform(low, high, (count, len(low))))
+
+
+def largest_in_box(
+    plan: Plan, off: Callable[[FloatArray], FloatArray], seed: int, beyond: float = 0.0
+) -> float:
+    """Largest of what `off` tells of atom values (n, a) in the trained box, or so many spans `beyond` it.
+
+    It is looked for nearer and nearer to where it is largest; infinite where it is no number.
+    """
+    rng, (low, high) = np.random.default_rng([seed, 3]), _ends(plan, beyond)
+    count, largest = POINTS // len(_NEARER), 0.0
+    about = np.tile(0.5 * (low + high), (count, 1))
+    for share in _NEARER:
+        moved = about + share * (high - low) * rng.uniform(-1.0, 1.0, about.shape)
+        atoms = _with_directions(plan, np.clip(moved, low, high))
+        values = off(atoms)
+        largest = max(largest, float(np.where(np.isfinite(values), values, np.inf).max()))
+        about = np.repeat(atoms[np.argsort(values)[-_BEST:]], count // _BEST, axis=0)
+    return largest
+
+
+def _ends(plan: Plan, beyond: float) -> tuple[FloatArray, FloatArray]:
+    """The trained box and so many spans about it."""
     low, high = plan.limits.box_low, plan.limits.box_high
     margin = beyond * (high - low)
-    atoms = rng.uniform(low - margin, high + margin, (count, len(low)))
-    for i, atom in enumerate(plan.atoms):
-        if atom.operator == "sign":
-            atoms[:, i] = np.clip(np.round(atoms[:, i]), -1.0, 1.0)
-    return np.asarray(atoms)
+    return np.asarray(low - margin), np.asarray(high + margin)
+
+
+def _with_directions(plan: Plan, atoms: FloatArray) -> FloatArray:
+    """Atom values of which directions are -1, 0 or 1."""
+    signs = [i for i, atom in enumerate(plan.atoms) if atom.operator == "sign"]
+    atoms[:, signs] = np.clip(np.round(atoms[:, signs]), -1.0, 1.0)
+    return atoms
 
 
 @dataclass(frozen=True)
@@ -130,14 +161,25 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
         apart = 0.5 * (first_low + first_high - low - high), 0.02 * span
         middle, width = _offset(plan, plan.sensors[i]) or apart
         paths[:, i] = paths[:, 0] - middle - width * np.sin(2.0 * np.pi * (1.5 + i) * time / time[-1])
-    size = _GYRO_DEG_H / (abs(plan.arrays["scale"][0]) if plan.gives_rate else 1.0)
-    gyro = size * rng.uniform(-1.0, 1.0, count)
+    gyro = output_size(plan) * rng.uniform(-1.0, 1.0, count)
     keep = np.ones(count, dtype=np.bool_)
     for length_s in (2 * step, 3 * step, 0.2 * longest, 0.3 * longest, 2.0 * longest):
         start, length = int(rng.integers(count // 2, count - 2)), round(length_s / step)
         keep[start : start + min(length, count // 20)] = False
     keep[-1] = True
     return History(np.asarray(time[keep], dtype=np.float64), paths[keep], gyro[keep])
+
+
+def recorded_history(plan: Plan, run: Run, seed: int) -> History:
+    """The times and readings of a recorded run, with outputs as a history has."""
+    gyro = output_size(plan) * np.random.default_rng([seed, 5]).uniform(-1.0, 1.0, len(run))
+    paths = [input_of(run, name) for name in plan.sensors]
+    return History(run.time, np.column_stack(paths) if paths else np.empty((len(run), 0)), gyro)
+
+
+def output_size(plan: Plan) -> float:
+    """Largest output of a history, in the model's unit."""
+    return GYRO_DEG_H / (abs(float(plan.arrays["scale"][0])) if plan.gives_rate else 1.0)
 
 
 def reached_points(plan: Plan, seed: int, box_share: float = 0.25) -> tuple[FloatArray, str]:
