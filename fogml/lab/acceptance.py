@@ -6,6 +6,7 @@ Each figure is the one of `fogml.validation` and of ``fogml lab rate``: nothing 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,8 @@ from fogml.models.table import usable_rows
 from fogml.runs.findings import IMPLAUSIBLE, SATURATION
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
-from fogml.signals.averages import AVERAGING_S
+from fogml.runs.turning import turning
+from fogml.signals.averages import AVERAGING_S, block_averages
 from fogml.validation.advice import Asked
 from fogml.validation.judge import judge_run
 from fogml.validation.results import RunJudgement
@@ -70,17 +72,22 @@ def acceptance_json(
     Raises
     ------
     InputError
-        For runs of several units or axes, or of another than the model's, and for a run too short.
+        For runs of several units or axes, or of another than the model's, and for one at rest that is too short.
     """
     limits = limits or Limits()
     _check_one_gyro(runs)
     (runs,) = named_apart(runs)
     errors = [_errors(run, model) for run in runs]
-    judged = [
-        judge_run(one, averaging_s, (0.0, 0.0), one.run.earth_known, turn_on_band, noise) for one in errors
-    ]
+    turned = {one.run.name for one in errors if not _rests(one, averaging_s)}
+    judged = []
+    for one in errors:
+        known, apart = one.run.earth_known, averaging_s
+        if one.run.name in turned:
+            # Its turns tell what they tell without an average of its rests.
+            one, apart = replace(one, used=np.ones_like(one.used)), min(averaging_s, 0.25 * one.run.span_s)
+        judged.append(judge_run(one, apart, (0.0, 0.0), known, turn_on_band, noise))
     after = [_compensated(one) for one in errors]
-    figures = dict(figures_of(runs, after, judged, noise, limits))
+    figures = dict(figures_of(runs, after, judged, noise, limits, turned))
     rows = [_row(one, figures.get(one.key), limits, model is not None) for one in QUANTITIES]
     seen = _seen(runs, model)
     still = [f"{one.run}: the output stands still: {one.still[0]}" for one in judged if one.still]
@@ -91,7 +98,12 @@ def acceptance_json(
     notes = [f"{run.name}: {one.message}" for run in runs for one in run.findings if one.code in told]
     notes += _of_earth(runs)
     notes += [f"{name}: the model was trained on this run" for name in seen]
-    notes += _left_out(errors) + _near(rows, limits)
+    notes += _left_out([one for one in errors if one.run.name not in turned]) + _near(rows, limits)
+    if turned:
+        notes.append(
+            f"{listed(sorted(turned), 3)}: the table rests for less than two averages over {averaging_s:g} s "
+            "(--averaging), which tells no bias; scale factor, threshold and resolution are told all the same"
+        )
     small = {run.name for run in runs if small_rates(run)}
     if small:
         notes.append(
@@ -110,7 +122,7 @@ def acceptance_json(
         "runs": [_run(run, one) for run, one in zip(runs, judged, strict=True)],
         "model": None if model is None else _model(model),
         "limits": _limits(limits),
-        "soaks": soak_table([one for one in judged if one.run not in small]),
+        "soaks": soak_table([one for one in judged if one.run not in small | turned]),
         "rows": rows,
         "verdict": verdict,
         "reasons": reasons,
@@ -147,6 +159,14 @@ def _errors(run: Run, model: DriftModel | None) -> RunErrors:
     used, notes = usable_rows(run, full)
     nothing, good = np.zeros(len(run)), np.zeros(len(run), np.int8)
     return RunErrors(run, run.error_deg_h, nothing, nothing, good, good != 0, full, used, notes)
+
+
+def _rests(errors: RunErrors, averaging_s: float) -> bool:
+    """Whether a run tells a bias: it does not turn, or rests for two averages."""
+    time = errors.run.time
+    if not (moving := turning(errors.run)).any() or averaging_s < errors.run.sample_s:
+        return True
+    return len(block_averages(time[errors.used & ~moving], window_s=averaging_s)) > 1
 
 
 def _left_out(errors: Sequence[RunErrors]) -> list[str]:

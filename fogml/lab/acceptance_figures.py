@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -124,6 +124,7 @@ def figures_of(
     judged: Sequence[RunJudgement],
     noise: Run | None,
     limits: Limits,
+    turned: Container[str] = (),
 ) -> Iterator[tuple[str, Figure]]:
     """Each quantity that the runs tell.
 
@@ -137,8 +138,12 @@ def figures_of(
         A static run for the noise terms; by default one of the runs.
     limits
         Of a figure of single runs that is told which violates its limit most.
+    turned
+        Names of runs whose rests tell no bias.
     """
-    steady = [one for run, one in zip(before, judged, strict=True) if not small_rates(run)] or judged
+    rested = [one for one in judged if one.run not in turned]
+    small = {run.name for run in before if small_rates(run)}
+    steady = [one for one in rested if one.run not in small] or rested
     biased = {**dict.fromkeys(_OF_BIAS, steady), "bias": known_earth(steady)}
     for key in _OF_RUNS:
         told = [one for one in biased.get(key, judged) if getattr(one.after, key) is not None]
@@ -150,11 +155,11 @@ def figures_of(
             worst = told[place]
             was = factors[place] * getattr(worst.before, key)
             yield key, Figure(was, values[place], worst.run, ci90=_within(key, worst))
-    yield from _turn_on(judged, limits)
+    yield from _turn_on(rested, limits)
     for key, pair in soaks_tell(known_earth(steady)).items():
-        if all(getattr(one.after, key) is None for one in judged):
+        if all(getattr(one.after, key) is None for one in rested):
             yield key, Figure(*pair, "all runs together")
-    spread = repeatability_of(known_earth(judged))
+    spread = repeatability_of(known_earth(rested))
     if spread is not None:
         yield "bias_repeatability", _repeated(spread.bias, _over(spread))
     spread = repeatability_of(judged)

@@ -52,6 +52,23 @@ def test_nonlinearity_and_asymmetry_of_rates_that_rise_are_those_of_the_gyro_and
         assert told == pytest.approx(40.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(("stay", "rests"), [(20, True), (10, False), (200, False)])
+def test_a_ladder_that_hardly_rests_tells_its_scale_factor_and_no_bias(cycle, stay, rests):
+    """Short rests refused the report altogether; without rests what the scale factor is off was a bias."""
+    rates = 3600.0 * np.array([sign * size for size in (1.0, 20.0, 50.0, 100.0) for sign in (1.0, -1.0)])
+    rates = np.append(np.column_stack([np.zeros(8), rates]).ravel(), 0.0) if rests else rates
+    ladder = table_run("ladder", rates, rates * (1.0 + 50e-6) + 0.3, stay=stay)
+    alone, both = acceptance_json([ladder]), acceptance_json([cycle, ladder])
+    assert row(alone, "scale_factor_error")["before"] == pytest.approx(50.0, abs=0.01)
+    assert not row(alone, "bias")["tested"] and not row(alone, "bias_stability")["tested"]
+    (note,) = (note for note in alone["notes"] if "tells no bias" in note)
+    assert note.startswith("ladder: ") and note in both["notes"]
+    for key in ("bias", "bias_stability", "hysteresis"):
+        assert row(both, key) == row(acceptance_json([cycle]), key)
+    assert row(alone, "scale_factor_nonlinearity")["before"] < 1.0
+    assert "ladder" in acceptance_page(both)
+
+
 def warming(name, time_constant_s, ramp_deg_h=0.0):
     time = np.arange(7200.0)
     noise = 1e-4 * np.random.default_rng(1).standard_normal(len(time))
