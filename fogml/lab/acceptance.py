@@ -72,7 +72,7 @@ def acceptance_json(
     Raises
     ------
     InputError
-        For runs of several units or axes, or of another than the model's, and for one at rest that is too short.
+        For runs of several units or axes, or of another than the model's, and for a short one at rest.
     """
     limits = limits or Limits()
     _check_one_gyro(runs)

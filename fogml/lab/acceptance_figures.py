@@ -289,7 +289,7 @@ def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) ->
     static = [pair for pair in pairs if not pair[0].rate.any() and not moving_temperatures(pair[0])]
     if not static:
         return
-    pair = max(static, key=lambda one: one[0].span_s)
+    pair = max(static, key=lambda one: (one[0].span_s, one[0].hash))
     try:
         told = [noise_report(run)["terms"] for run in pair]
     except InputError:

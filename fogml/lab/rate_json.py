@@ -92,7 +92,8 @@ def rate_json(
     small = _small(read, greatest, scale, criteria)
     zero, steps = (_by_size(answers) for answers in small)
     band = bandwidth(read.gains, scale)
-    limit = min(read.slews, key=lambda one: one[0], default=(0.0, None))[1]
+    # The run with the closest samples tells it best; of such, the one that changed fastest.
+    limit = min(read.slews, key=lambda one: (one[0], -one[1].output_deg_s2), default=(0.0, None))[1]
     followed = greatest if held is None else held.followed
     sensed = temperature_sensitivity([run for run, _ in read.ladders], criteria.small * greatest, followed)
     values: dict[str, Any] = {
@@ -158,7 +159,6 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
                 )
             ladders.append((run, plateaus))
             found = slew(run, plateaus)
-            # The run with the closest samples tells it best.
             slews += [] if found is None else [(float(np.median(np.diff(run.time))), found)]
     if not ladders and not gains:
         more = f" beyond the {short(settle_s)} s that are left out" if settle_s else ""
@@ -174,9 +174,11 @@ def _main_ladder(
     read: _Read, greatest: float, criteria: Criteria
 ) -> tuple[Line, Range, tuple[str, ...], list[str]] | None:
     """Of the run, and the temperature, with the most different large rates against the greatest of all
-    [deg/h]; a scale factor that goes with temperature is no nonlinearity. With what to mind, and the run."""
+    [deg/h]; a scale factor that goes with temperature is no nonlinearity. Of several with as many, it is the
+    one that stays on them for most samples; by its content where these are as many too, so that no order of
+    files decides, and none by what it tells. With what to mind, and the run."""
     best: tuple[Line, Range, Run, Plateaus] | None = None
-    most, short_of = 0, dict[str, float]()
+    most, short_of = (0, 0, ""), dict[str, float]()
     for run, whole in read.ladders:
         for plateaus in by_temperature(run, whole):
             found = scale_line(plateaus, criteria)
@@ -184,8 +186,9 @@ def _main_ladder(
             levels = len(np.unique(rate[np.abs(rate) >= criteria.small * greatest]))
             if found is not None and found[1].exceeded is not None:
                 short_of[run.name] = min(found[1].exceeded, short_of.get(run.name, np.inf))
-            if found is not None and levels > most:
-                best, most = (*found, run, plateaus), levels
+            told = (levels, int((plateaus.stop - plateaus.start).sum()), run.hash)
+            if found is not None and levels and told > most:
+                best, most = (*found, run, plateaus), told
     if best is None:
         return None
     line, held, run, plateaus = best
@@ -236,7 +239,9 @@ def _small(
 
 
 def _by_size(answers: dict[str, list[Answer]]) -> list[Answer]:
-    return sorted((one for of in answers.values() for one in of), key=lambda one: one.size)
+    return sorted(
+        (one for of in answers.values() for one in of), key=lambda one: (one.size, one.share, one.se)
+    )
 
 
 def _range(held: Range | None) -> dict[str, Any] | None:
@@ -250,12 +255,13 @@ def _bracket(found: Bracket | None) -> dict[str, Any] | None:
 
 
 def _count(runs: Sequence[Run]) -> float | None:
-    """Angle of a count [arcsec], where an output is in counts."""
-    for run in runs:
-        if run.gyro_unit == "count" and run.facts.scale_factor is not None and len(run) > 1:
-            step = float(np.median(np.diff(run.time)))
-            return step / abs(run.facts.scale_factor.count_per_deg_h)
-    return None
+    """Angle of a count [arcsec], the finest, where an output is in counts."""
+    angles = [
+        run.sample_s / abs(run.facts.scale_factor.count_per_deg_h)
+        for run in runs
+        if run.gyro_unit == "count" and run.facts.scale_factor is not None and len(run) > 1
+    ]
+    return min(angles, default=None)
 
 
 def unit_facts(twin: Twin) -> dict[str, Any]:

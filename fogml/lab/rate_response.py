@@ -100,7 +100,7 @@ def bandwidth(gains: Sequence[Gain], scale_factor: float = 1.0) -> Bandwidth | N
     """
     if len(gains) < 2:
         return None
-    ordered, scale = sorted(gains, key=lambda one: one.frequency_hz), abs(scale_factor)
+    ordered, scale = sorted(gains, key=lambda one: (one.frequency_hz, one.gain)), abs(scale_factor)
     f = np.array([one.frequency_hz for one in ordered])
     gain = np.array([one.gain for one in ordered]) / scale
     error = np.array([max(one.se, 1e-12 * one.gain) for one in ordered]) / scale
