@@ -71,9 +71,7 @@ class Hdf5:
     def datasets(self, group: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str, Any, str | None]]:
         """Datasets by name, also where the unit holds a slash, with what keeps them from being read."""
         for name in group:
-            self.seen += 1
-            if self.seen > MOST_NAMES:
-                raise Refused(f"more than {MOST_NAMES} names")
+            self.count()
             full = above + name
             if not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
                 yield full, None, "is a link to another place"
@@ -84,14 +82,24 @@ class Hdf5:
             elif isinstance(item, self.h5py.Group) and "[" in full and depth < _DEEPEST:
                 yield from self.datasets(item, full + "/", depth + 1)
 
+    def count(self) -> None:
+        """Count a name, or what is referred to.
+
+        Raises
+        ------
+        Refused
+            If there are more than any recording holds.
+        """
+        self.seen += 1
+        if self.seen > MOST_NAMES:
+            raise Refused(f"more than {MOST_NAMES} names")
+
     def fault_of(self, dataset: Any) -> str | None:
         """Why a dataset is not read: its samples lie elsewhere, or other code would unpack them."""
         if dataset.shape is None:
             return "holds nothing"
         if dataset.is_virtual or dataset.external:
             return "refers to samples in another file"
-        if dataset.dtype.kind not in "fiub":
-            return None
         creation = dataset.id.get_create_plist()
         filters = [creation.get_filter(i)[0] for i in range(creation.get_nfilters())]
         strange = [number for number in filters if number not in _PLAIN_FILTERS]
@@ -165,12 +173,40 @@ class Mat:
         found: dict[str, Any] = {}
         for name in group:
             is_member = isinstance(group.get(name, getlink=True), h5py.HardLink) and not name.startswith("#")
-            item = group[name] if is_member else None
-            if isinstance(item, h5py.Group) and depth < _DEEPEST:
-                found[name] = self.members(item, depth + 1)
-            elif isinstance(item, h5py.Dataset):
-                is_text = text_of(item.attrs.get("MATLAB_class", b"")) == "char"
-                found[name] = self.text(item) if is_text else item
+            if is_member and (value := self.member(group[name], depth)) is not None:
+                found[name] = value
+        return found
+
+    def member(self, item: Any, depth: int) -> Any:
+        """A struct, a list of structs, a text, or samples that are not read yet; None for what is none."""
+        assert self.opened is not None
+        self.opened.count()
+        if isinstance(item, self.opened.h5py.Group) and depth < _DEEPEST:
+            held = self.members(item, depth + 1)
+            return self.each_struct(held, depth) if held and all(map(self.refers, held.values())) else held
+        if is_dataset(item):
+            return self.text(item) if _class_of(item) == "char" else item
+        return None
+
+    def refers(self, value: Any) -> bool:
+        """Whether it is a field of an array of structs: references to what each of them holds."""
+        assert self.opened is not None
+        is_reference = is_dataset(value) and value.dtype == self.opened.h5py.ref_dtype
+        return is_reference and not _class_of(value) and self.opened.fault_of(value) is None
+
+    def each_struct(self, fields: Mapping[str, Any], depth: int) -> list[dict[str, Any]]:
+        """The structs of an array of structs, as MATLAB counts them."""
+        assert self.opened is not None
+        count = max(field.size for field in fields.values())
+        if count > MOST_NAMES:
+            raise Refused(f"an array of more than {MOST_NAMES} structs")
+        found: list[dict[str, Any]] = [{} for _ in range(count)]
+        for name, field in fields.items():
+            # MATLAB counts down the columns, and HDF5 holds its arrays turned over.
+            for struct, reference in zip(found, np.asarray(field).reshape(-1)):
+                value = self.member(self.opened.file[reference], depth + 1) if reference else None
+                if value is not None:
+                    struct[name] = value
         return found
 
     def text(self, item: Any) -> str:
@@ -203,6 +239,11 @@ class PutAway:
 
     def __getitem__(self, part: Any) -> np.ndarray[Any, Any]:
         return np.array(np.memmap(self.file, self.dtype, "r", shape=self.shape, order=self.order)[part])
+
+
+def _class_of(dataset: Any) -> str:
+    """What MATLAB calls a dataset; nothing for a field of an array of structs."""
+    return text_of(dataset.attrs.get("MATLAB_class", b""))
 
 
 def apart(held: Mapping[str, Any]) -> dict[str, Any]:

@@ -64,7 +64,7 @@ def _of_container(path: Path, kind: str) -> tuple[list[str], list[Field]]:
         for group in groups:
             for cell, array in group.columns:
                 name, unit = parse_header(cell)
-                is_joined = {main, group.name} <= set(timed) and name != "time"
+                is_joined = {main, group.name} <= set(timed) and name != "time" and not group.is_run
                 if group.name == main or (is_joined and _WARM.search(name)):
                     source = f"{group.name}/{array.name}" if group.name else array.name
                     sound = vector_fault(array) is None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -108,10 +108,7 @@ class BlockWriter:
     def __init__(self, path: str | Path, facts: Facts | None = None) -> None:
         self.path = Path(path)
         self.facts = facts
-        if _checked_suffix(self.path) not in (".csv", ".parquet"):
-            raise InputError(
-                f"{self.path.name}: written block by block are .csv and .parquet; choose one of them"
-            )
+        _checked_suffix(self.path, (".csv", ".parquet"))
         self._stack = ExitStack()
         self._sink: Any = None
         self._schema: Schema | None = None
@@ -259,10 +256,9 @@ def check_side_file(path: str | Path, facts: Facts) -> Path | None:
     return beside
 
 
-def _checked_suffix(path: Path) -> str:
+def _checked_suffix(path: Path, taken: Sequence[str] = SUFFIXES) -> str:
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(
-            f"{path.name or path}: format '{suffix}' is not known; use one of {', '.join(SUFFIXES)}"
-        )
+    if suffix not in taken:
+        what = "is not written block by block" if suffix in SUFFIXES else "is not known"
+        raise InputError(f"{path.name or path}: format '{suffix}' {what}; use one of {', '.join(taken)}")
     return suffix

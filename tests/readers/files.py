@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -197,3 +199,32 @@ uint32 nanosec
             if i % 10 == 0:
                 inner.add_message(channel, now, b'{"temperature": %.6f}' % WARM[i], now)
         writer.finish()
+
+
+def mat_7_3_structs(path: Path, name: str, structs: Sequence[Mapping[str, Any]]) -> None:
+    """An array of structs as MATLAB saves it in version 7.3: each field lists references to `#refs#`."""
+    import h5py
+
+    def text(group: Any, key: str, value: str) -> Any:
+        made = group.create_dataset(key, data=np.array([[ord(one)] for one in value], dtype=np.uint16))
+        made.attrs["MATLAB_class"] = np.bytes_("char")
+        return made
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        group, held = file.create_group(name), file.create_group("#refs#")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for field in structs[0]:
+            references = group.create_dataset(field, (len(structs), 1), dtype=h5py.ref_dtype)
+            for place, struct in enumerate(structs):
+                key, value = f"{field}{place}", struct[field]
+                if isinstance(value, Mapping):
+                    made = held.create_group(key)
+                    for unit, told in value.items():
+                        text(made, unit, told)
+                elif isinstance(value, str):
+                    made = text(held, key, value)
+                else:
+                    made = held.create_dataset(key, data=np.asarray(value)[None, :])
+                references[place, 0] = made.ref
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")

@@ -199,6 +199,34 @@ def test_of_several_structs_of_a_matlab_file_it_is_said_what_is_not_read(tmp_pat
     np.testing.assert_array_equal(run.gyro, files.GYRO)
 
 
+def test_an_array_of_structs_of_matlab_7_3_is_read_as_that_of_version_5(tmp_path):
+    pytest.importorskip("h5py")
+    path, units = tmp_path / "log.mat", {"time": "s", "gyro": "deg/h", "T_in": "degC"}
+    own = {"time": TIME, "gyro": GYRO, "T_in": WARM, "units": units, "note": "bench 4"}
+    files.mat_7_3_structs(path, "runs", [own])
+    run = read_run(path)
+    np.testing.assert_array_equal(run.gyro, GYRO)
+    np.testing.assert_array_equal(run.columns["T_in"], WARM)
+    files.mat_7_3_structs(path, "runs", [own, {**own, "gyro": -GYRO}])
+    with pytest.raises(InputError, match=r"runs\(1\), runs\(2\) each hold a time and a gyro; save the one"):
+        read_run(path)
+    (tmp_path / "p.yaml").write_text(draft_profile(path))
+    (run,) = import_recording(path, tmp_path / "p.yaml")
+    # The thermometer of the other struct is another run's.
+    np.testing.assert_array_equal(run.gyro, GYRO)
+    assert list(run.columns) == ["time", "gyro", "T_in"]
+
+
+def test_structs_of_matlab_7_3_that_hold_each_other_are_refused(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.mat"
+    files.mat_7_3_structs(path, "runs", [{"a": {"b": "x"}}] * 50)
+    with h5py.File(path, "r+") as file:
+        file["runs/a"][:] = np.full((50, 1), file["runs"].ref, dtype=h5py.ref_dtype)
+    with pytest.raises(InputError, match="more than 10000 names"):
+        read_run(path)
+
+
 def test_the_struct_of_a_matlab_file_and_the_group_of_an_hdf5_file(tmp_path):
     inner = {"time_s": TIME, "gyro_dph": GYRO, "note": "bench 4", "deeper": {"T_in_C": WARM}}
     savemat(tmp_path / "log.mat", {"setup": {"rate": 4.0}, "log": inner})

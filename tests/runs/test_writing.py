@@ -161,7 +161,7 @@ def test_an_unknown_suffix_and_a_missing_folder(tmp_path):
         write_run(run, tmp_path / "run.xyz")
     with pytest.raises(InputError, match="no such folder"):
         write_run(run, tmp_path / "none" / "run.csv")
-    with pytest.raises(InputError, match=r"\.csv and \.parquet"):
+    with pytest.raises(InputError, match=r"block by block; use one of \.csv, \.parquet"):
         BlockWriter(tmp_path / "run.h5")
 
 
