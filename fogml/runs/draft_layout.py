@@ -142,7 +142,8 @@ def _are_below(path: Path, encoding: str, mark: str | None, rows: Sequence[Seque
     lines = [_split(line, mark) for line in re.split(r"\r\n|\r|\n", tail)[1:] if line.strip()]
     width = len(rows[0])
     # Of a short file the last of them are those that stand below.
-    full = [row for row in rows[: len(rows) // 2 + 1] if _is_data(row, width)]
+    numeric = _numeric(rows, width)
+    full = [row for row in rows[: len(rows) // 2 + 1] if _is_data(row, width, numeric)]
     held = [i for i in range(width) if all(is_number_like(row[i].strip(' "')) for row in full)]
     return any(len(f) != width or not all(is_number_like(f[i].strip(' "')) for i in held) for f in lines)
 
@@ -155,7 +156,9 @@ def _table_of(text: str) -> tuple[str, list[str], int | None]:
         rows = [_split(line, mark) for line in lines[-MOST_ROWS:] if line.strip()]
         counts = [len(row) for row in rows]
         width = max(set(counts), key=counts.count) if counts else 0
-        first = _first_of_longest([not t.strip() or _is_data(_split(t, mark), width) for t in lines], lines)
+        numeric = _numeric(rows, width)
+        is_data = [not t.strip() or _is_data(_split(t, mark), width, numeric) for t in lines]
+        first = _first_of_longest(is_data, lines)
         numbers = [sum(is_number_like(f.strip(' "')) for f in row) for row in rows]
         score = float(np.median(numbers)) if numbers else 0.0
         if first is not None and score > best[0]:
@@ -170,8 +173,17 @@ def _first_of_longest(is_data: Sequence[bool], lines: Sequence[str]) -> int | No
     return next((i for i in max(stretches, key=len) if lines[i].strip()), None)
 
 
-def _is_data(fields: Sequence[str], width: int) -> bool:
-    return len(fields) == width and 2 * sum(is_number_like(f.strip(' "')) for f in fields) >= width
+def _numeric(rows: Sequence[Sequence[str]], width: int) -> list[int]:
+    """Places at which most rows of a width hold numbers: a status or a code in hexadecimal does by chance."""
+    full = [row for row in rows if len(row) == width]
+    return [
+        i for i in range(width) if 2 * sum(is_number_like(row[i].strip(' "')) for row in full) > len(full)
+    ]
+
+
+def _is_data(fields: Sequence[str], width: int, numeric: Sequence[int]) -> bool:
+    numbers = [is_number_like(fields[i].strip(' "')) for i in numeric] if len(fields) == width else []
+    return bool(numbers) and 2 * sum(numbers) >= len(numbers)
 
 
 def _split(line: str, mark: str | None) -> list[str]:

@@ -86,8 +86,10 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     left = [f for f in left if f not in gyros]
     if not gyros:
         held = [f for f in left if np.isfinite(f.numbers).any() or not f.first]
-        # States and marks take few values; a thermometer is named as one.
-        gyros = sorted(held, key=lambda f: (bool(_WARM.search(f.name)), _takes_few(f)))[:1]
+        # States and marks take few values, a code is now and then a number; a thermometer is named as one.
+        text = [int(np.isnan(f.numbers).sum()) for f in held]
+        ranks = [(bool(_WARM.search(f.name)), _takes_few(f), n) for f, n in zip(held, text, strict=True)]
+        gyros = [f for _, f in sorted(zip(ranks, held, strict=True), key=lambda one: one[0])[:1]]
         left = [f for f in left if f not in gyros]
     axes = {m[1].lower(): f for f in gyros if (m := _AXIS.search(f.name))}
     many = len(gyros) > 1 and len(axes) == len(gyros)
@@ -192,7 +194,11 @@ def _gyro(one: Field | None, many: bool) -> str:
     if one.unit is not None and is_accepted("gyro", one.unit):
         return f"{{{source}unit: {as_yaml(one.unit)}}}"
     values = one.numbers
-    hints = (("deg/h", r"dph|deg_?h|grad/h"), ("deg/s", r"dps|deg_?s|grad/s"), ("rad/s", r"(?<!g)rad"))
+    hints = (
+        ("deg/h", r"dph|deg(_?p(er)?)?_?h|grad/h"),
+        ("deg/s", r"dps|deg(_?p(er)?)?_?s|grad/s"),
+        ("rad/s", r"(?<!g)rad"),
+    )
     text = f"{one.name} {one.unit or ''}".lower()
     unit = next((u for u, hint in hints if re.search(hint, text)), None)
     if unit is None and len(values) and np.all(values == np.round(values)):

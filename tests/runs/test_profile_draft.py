@@ -215,7 +215,15 @@ def test_a_clock_without_a_unit_is_told_by_what_its_steps_would_be(tmp_path, ste
 
 
 @pytest.mark.parametrize(
-    ("cell", "factor"), [("Drehrate in Grad/s", 3600.0), ("Gyro [Grad/h]", 1.0), ("wx_rad", 648000.0 / np.pi)]
+    ("cell", "factor"),
+    [
+        ("Drehrate in Grad/s", 3600.0),
+        ("Gyro [Grad/h]", 1.0),
+        ("wx_rad", 648000.0 / np.pi),
+        ("Gyro_degph", 1.0),
+        ("w_deg_per_h", 1.0),
+        ("w_deg_per_sec", 3600.0),
+    ],
 )
 def test_a_guess_of_the_gyros_unit_goes_by_what_the_cell_says(tmp_path, cell, factor) -> None:
     """Grad is no radian: the guess of a file of German headers was 57 or 3600 times off."""
@@ -341,6 +349,18 @@ def test_a_remark_with_a_date_is_no_header(tmp_path):
     (tmp_path / "log.txt").write_text("% 2014-03-21 17:31:51 by a fitter\n" + rows)
     draft = draft_profile(tmp_path / "log.txt")
     assert "header: false" in draft and "skip_lines: 1" in draft
+
+
+def test_a_code_in_hexadecimal_that_is_a_number_now_and_then_does_not_cut_the_data(tmp_path):
+    """Rows before the longest stretch of codes of digits alone were taken for lines above the data."""
+    codes = [f"{7 * i:04X}" for i in range(COUNT)]
+    assert any(code.isdigit() for code in codes) and not all(code.isdigit() for code in codes)
+    rows = [f"$GYRO,{i},{code},{7 + i % 41}.5,OK*3F" for i, code in enumerate(codes)]
+    (tmp_path / "log.txt").write_text("\n".join(["# a capture", *rows, ""]))
+    (tmp_path / "profile.yaml").write_text(draft_profile(tmp_path / "log.txt"))
+    (run,) = import_recording(tmp_path / "log.txt", tmp_path / "profile.yaml")
+    np.testing.assert_array_equal(run.time, np.arange(COUNT))
+    np.testing.assert_allclose(run.gyro, 3600.0 * (7.5 + np.arange(COUNT) % 41))
 
 
 def test_the_first_rows_of_counts_are_in_counts(tmp_path):
