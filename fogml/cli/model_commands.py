@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError
@@ -194,7 +195,9 @@ def _understood(value: Any) -> Space:
             key = str(first["loc"][0])
             known = known_are(key, Space.model_fields, "known keys")
             raise ValueError(f"unknown key {quoted(key)}; {known}") from None
-        place = ".".join(str(part) for part in first["loc"] if str(part) not in ("Range", "list[float]"))
+        # What pydantic tried a value as stands among the keys.
+        keys = [str(part) for part in first["loc"] if not re.search(r"\[|^Range$", str(part))]
+        place = ".".join(keys)
         reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
         raise ValueError(f"{place}: {reason}" if place else reason) from None
 
@@ -236,6 +239,12 @@ class SweepSettings(Settings):
     averaging: options.Averaging = 100.0
     repair: options.Repair = False
     out: options.Folder = "sweep-results"
+
+    def check_given(self) -> None:
+        """As `Settings.check_given`, and that a number of folds is of folds in time."""
+        super().check_given()
+        if self.folds == "runs" or (self.folds == "auto" and len(self.runs) > 1):
+            self.refuse_idle(("fold_count",), "is of folds in time, and each run is one; state 'folds: time'")
 
     def as_written(self) -> dict[str, Any]:
         """The values of a configuration file; a password is never written."""

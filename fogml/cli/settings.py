@@ -127,8 +127,9 @@ class Settings(Strict):
         """
         for name in names:
             if getattr(self, name) != type(self).model_fields[name].default:
-                own = given_settings(type(self))[name].names or ("--" + name.replace("_", "-"),)
-                raise InputError(f"{own[0].partition('/')[0]} {why}")
+                own = given_settings(type(self)).get(name)
+                option = (own.names or ("--" + name.replace("_", "-"),))[0] if own else quoted(name)
+                raise InputError(f"{option.partition('/')[0]} {why}")
 
     def in_full(self) -> Self:
         """The settings with every path in full, to be run from anywhere; what ships keeps its name."""

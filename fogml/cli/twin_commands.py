@@ -228,7 +228,7 @@ class SimulateSettings(Settings):
     )
     draws: int = setting(
         0,
-        "Units drawn from what is not known of the twin, a run each: OUT-1, OUT-2, ...",
+        "Units drawn from what is not known of the twin, a run each, in OUT-1, OUT-2 and so on.",
         metavar="UNITS",
         ge=0,
     )
@@ -254,6 +254,12 @@ class SimulateSettings(Settings):
             near = config.parent / run.programme if isinstance(run.programme, str) else None
             runs.append(run.model_copy(update={"programme": str(near)}) if near and near.is_file() else run)
         return found.model_copy(update={"runs": runs})
+
+    def check_given(self) -> None:
+        """As `Settings.check_given`, and that what is said of storage is of several runs."""
+        super().check_given()
+        if not self.runs:
+            self.refuse_idle(("storage",), "is of the time between runs; state 'runs'")
 
     def in_full(self) -> Self:
         """The settings with every path in full."""

@@ -22,7 +22,7 @@ from fogml.runs.columns import REPLAYED
 from fogml.runs.facts import facts_from
 from fogml.runs.other_rate import at_times_of, is_simulator_output, read_gnss_ins_sim
 from fogml.runs.run import Run
-from fogml.runs.writing import BlockWriter, carried_cells, header_cells
+from fogml.runs.writing import IN_BLOCKS, BlockWriter, carried_cells, checked_suffix, header_cells
 from fogml.twin.draws import drawn_twin
 from fogml.twin.programme import load_programme
 from fogml.twin.replay import replay
@@ -70,8 +70,9 @@ def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
 
 def _simulate_into(out: Path, world: World, truth: str | None, terminal: Terminal) -> int:
     samples = len(world.timeline)
-    # No format holds a sample in less than a byte.
-    check_room(out, float(samples), f"{samples:.3g} samples", "state a longer --sample")
+    # A cell of a text is a digit and a mark at least, and no format holds a sample in less than a byte.
+    least_bytes = 2 * (len(world.columns) + 2) if out.suffix.lower() == ".csv" else 1
+    check_room(out, float(samples) * least_bytes, f"{samples:.3g} samples", "state a longer --sample")
     with terminal.work(f"simulating {world.timeline.programme.name}", total=samples) as work:
         return write_world(world, out, truth, work.advance)
 
@@ -141,7 +142,7 @@ def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
                 twin,
                 settings.sample_s if run.sample_s is None else run.sample_s,
                 settings.seed + number,
-                run.columns or settings.columns,
+                settings.columns if run.columns is None else run.columns,
                 facts.model_copy(update={"started": run.started}),
                 truth=run.truth is not None,
                 before=before,
@@ -212,6 +213,9 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
     if elsewhere and (settings.only or settings.truth or settings.after):
         raise InputError(f"{settings.twin}: a simulator's output takes no --only, --truth or --after")
     twin = None if elsewhere else load_twin(settings.twin)
+    if twin is not None:
+        settings.refuse_idle(("gyro_axis",), "is of a simulator's output; leave it out with a twin")
+    checked_suffix(out, IN_BLOCKS)
     with terminal.work(f"reading {settings.run}") as work:
         run = open_run(settings.run, repair=settings.repair)
         note_findings([run], terminal)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from pyarrow import Schema, Table
 
 SUFFIXES = (".csv", ".parquet", ".h5", ".hdf5", ".mat")
+IN_BLOCKS = (".csv", ".parquet")
+"""Of formats that are written block by block."""
 _ROW_GROUP = 1 << 20
 
 
@@ -43,7 +45,7 @@ def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | 
         states other facts, or a value of a known column is not finite.
     """
     path = Path(path)
-    suffix = _checked_suffix(path)
+    suffix = checked_suffix(path)
     cells = header_cells(run)
     if suffix in (".csv", ".parquet"):
         with BlockWriter(path, run.facts) as writer:
@@ -108,7 +110,7 @@ class BlockWriter:
     def __init__(self, path: str | Path, facts: Facts | None = None) -> None:
         self.path = Path(path)
         self.facts = facts
-        _checked_suffix(self.path, (".csv", ".parquet"))
+        checked_suffix(self.path, IN_BLOCKS)
         self._stack = ExitStack()
         self._sink: Any = None
         self._schema: Schema | None = None
@@ -256,7 +258,14 @@ def check_side_file(path: str | Path, facts: Facts) -> Path | None:
     return beside
 
 
-def _checked_suffix(path: Path, taken: Sequence[str] = SUFFIXES) -> str:
+def checked_suffix(path: Path, taken: Sequence[str] = SUFFIXES) -> str:
+    """The suffix that tells the format of a file to write.
+
+    Raises
+    ------
+    InputError
+        If it is none of those that are taken.
+    """
     suffix = path.suffix.lower()
     if suffix not in taken:
         what = "is not written block by block" if suffix in SUFFIXES else "is not known"

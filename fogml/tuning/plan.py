@@ -119,6 +119,10 @@ class Space(Strict):
             raise ValueError("'models' needs at least one value for each parameter")
         if not self.builder:
             raise ValueError("'builder' needs at least one of block, slope, exp")
+        texts = "".join(text for part in self.features.values() for text in part)
+        for key, place in (("builder", BUILDER), ("window", WINDOW)):
+            if place not in texts and getattr(self, key) != type(self).model_fields[key].default:
+                raise ValueError(f"'{key}' would change nothing; write {place} in 'features' where it goes")
         return self
 
     def suggest(self, trial: optuna.Trial) -> Choice:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -134,6 +135,7 @@ def test_files_lie_beside_the_configuration(config, tmp_path, invoke, monkeypatc
         ({"schema": "fogml.simulate/2"}, "fogml.simulate/1"),
         ({"sample_s": -1}, "'sample_s' is -1"),
         ({"sample_s": 1e-12}, "samples do not fit into the"),
+        ({"storage": {"temperature": 20.0}}, "'storage' is of the time between runs"),
         ({"facts": {"latitud": 3}}, "facts: unknown key 'latitud'"),
         ({"twin": {"schema": "fogml.twin/1", "nominal": {"b9": 1}}}, "unknown key 'nominal.b9'"),
     ],
@@ -146,6 +148,15 @@ def test_faults_of_a_simulation(config, tmp_path, invoke, change, message):
     assert not out.exists() and not list(tmp_path.glob("*.config.yaml"))
 
 
+def test_a_text_takes_two_bytes_a_cell_at_least(config, tmp_path, invoke, monkeypatch):
+    # 360 samples of time, gyro and three columns.
+    for free, status in ((3599, 2), (3601, 0)):
+        room = SimpleNamespace(free=free)
+        monkeypatch.setattr("fogml.outputs.shutil.disk_usage", lambda path, room=room: room)
+        result = invoke("simulate", config, "-o", tmp_path / "run.csv", status=status)
+        assert ("360 samples do not fit into the 3.6e-06 GB free" in result.stderr) is (status == 2)
+
+
 def test_usage_faults(config, tmp_path, invoke):
     out = tmp_path / "run.csv"
     assert "no --out is given" in invoke("simulate", config, status=2).stderr
@@ -156,6 +167,11 @@ def test_usage_faults(config, tmp_path, invoke):
     assert "no --out is given" in invoke("replay", "nominal", "shipped:cold-start-x", status=2).stderr
     result = invoke("replay", "nominal", "shipped:cold-start-x", "-o", out, "--only", "moisture", status=2)
     assert "effect 'moisture' is not on" in result.stderr
+    result = invoke("replay", "nominal", "shipped:cold-start-x", "-o", out, "--axis", "z", status=2)
+    assert "--axis is of a simulator's output" in result.stderr
+    # Before anything is read.
+    told = invoke("replay", "nominal", config, "-o", tmp_path / "run.mat", status=2).stderr
+    assert "'.mat' is not written block by block; use one of .csv, .parquet" in told
     result = invoke("replay", "nominal", "shipped:cold-start-x", "-o", out, "--truth", config, status=2)
     assert "truth" in result.stderr and not out.exists()
 
