@@ -83,7 +83,7 @@ def test_all_that_a_sweep_lacks_is_named_at_once(invoke, tmp_path):
         ({"space": {**SPACE, "window": {"low": 5, "high": 1}}}, "low 5 must be below high 1"),
         ({"space": {"models": ["rbf"]}}, "features"),
         ({"trials": 0}, "at least 1"),
-        ({"fold_count": 3}, "3 folds"),
+        ({"folds": "time", "fold_count": 3}, "3 folds"),
         ({"sampler": "magic"}, "sampler 'magic'"),
         ({"workers": 0}, "workers 0"),
         ({"runs": []}, "no training run"),
