@@ -7,6 +7,7 @@ import pytest
 from pydantic import with_config
 
 from fogml.errors import InputError
+from fogml.runs.facts import Facts
 from fogml.strict import CONTENT, Strict, as_written, strictly
 
 
@@ -36,3 +37,13 @@ def test_what_is_written_is_read_and_no_key_beside_it(kind):
     assert strictly(kind, as_written(held)) == held
     with pytest.raises(InputError, match="key 'sizes'"):
         strictly(kind, {"sizes": 2.0})
+
+
+@pytest.mark.parametrize(
+    ("stated", "key"), [({"latitude": 100.0}, "latitude"), ({"axes": {"x": {"input_axis": 3}}}, "axes.x")]
+)
+def test_what_is_made_by_a_call_is_refused_as_a_file_s_content_is(stated, key):
+    with pytest.raises(InputError, match=f"Facts: key '{key}.*found"):
+        Facts(**stated)
+    with pytest.raises(InputError, match="Model: key 'size'"):
+        Model(size="1")

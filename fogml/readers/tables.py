@@ -122,11 +122,15 @@ class Sheet:
         self.content = Rows(spool, np.uint8)
         self.is_empty = True
         self.durations: set[int] = set()
+        self.switches: dict[int, int] = {}
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        for row in _with_midnights(rows):
+        for line, row in enumerate(_with_midnights(rows), start=1):
             writer.writerow([_cell(value) for value in row])
             self.durations.update(i for i, value in enumerate(row) if isinstance(value, timedelta))
+            self.switches = {
+                i: line for i, value in enumerate(row) if isinstance(value, bool)
+            } | self.switches
             if text.tell() > BLOCK_BYTES:
                 self.flush(text)
         self.flush(text)
@@ -157,6 +161,7 @@ class Workbook(Container):
         super().__init__()
         self.hidden: list[str] = []
         self.durations: dict[str, list[int]] = {}
+        self.switches: dict[str, list[tuple[int, int]]] = {}
         self.is_uncalculated = UNCALCULATED in keys and _is_uncalculated(path)
         if UNCALCULATED in keys:
             return
@@ -169,12 +174,13 @@ class Workbook(Container):
                 if not sheet.is_empty:
                     self.add("", name, None, sheet)
                     self.durations[name] = sorted(sheet.durations)
+                    self.switches[name] = sorted(sheet.switches.items())
 
     @property
     def told(self) -> dict[str, Any]:
-        """What the parent hears: also which sheets are hidden, and which columns are durations [s]."""
-        more = {"hidden": self.hidden, "durations": self.durations, UNCALCULATED: self.is_uncalculated}
-        return {**super().told, **more}
+        """What the parent hears: also hidden sheets, columns of durations [s] and of TRUE or FALSE."""
+        more = {"hidden": self.hidden, "durations": self.durations, "switches": self.switches}
+        return {**super().told, **more, UNCALCULATED: self.is_uncalculated}
 
 
 def _is_uncalculated(path: str) -> bool:
@@ -197,10 +203,8 @@ def _cell(value: Any) -> str:
     """A cell as a line of text, dates by ISO 8601, whole numbers without decimals."""
     if value is None or isinstance(value, str):
         return " ".join((value or "").replace("\0", "").splitlines())
-    if isinstance(value, bool):
+    if isinstance(value, bool) or (isinstance(value, float) and value.is_integer() and abs(value) < 1e15):
         return str(int(value))
-    if isinstance(value, float):
-        return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
     if isinstance(value, date) and value.year == 1900:
         return _hours(value)
     if isinstance(value, datetime):
@@ -210,13 +214,10 @@ def _cell(value: Any) -> str:
     return value.isoformat() if isinstance(value, date | time) else str(value)
 
 
-_DAY_0 = datetime(1899, 12, 31)
-
-
 def _hours(value: date) -> str:
     """A date of 1900, which a cell of hours becomes from a day on, as hours, minutes and seconds."""
     moment = value if isinstance(value, datetime) else datetime.combine(value, time())
-    minutes, rest = divmod(moment - _DAY_0, timedelta(minutes=1))
+    minutes, rest = divmod(moment - datetime(1899, 12, 31), timedelta(minutes=1))
     return f"{minutes // 60}:{minutes % 60:02}:{rest.seconds:02}.{rest.microseconds:06}"
 
 

@@ -6,6 +6,7 @@ Nothing is changed; each finding says where and how much.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from datetime import timedelta
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from fogml.errors import InputError, counted
 from fogml.numerals import short
 from fogml.runs.findings import DEAD, SATURATION, Finding, dead_words
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
-from fogml.runs.plausible import implausible
+from fogml.runs.plausible import HOUR_S, implausible
 from fogml.runs.run import Run
 from fogml.runs.steps import coarse_output
 from fogml.runs.stuck import stuck
@@ -133,7 +134,27 @@ def _gaps(run: Run) -> Iterator[Finding]:
             f"{gaps} longer than 3 sample intervals, the longest {short(lengths[longest], 4)} s at "
             f"{run.time[starts[longest] - 1]:.10g} s; the run is cut into {len(starts) + 1} stretches"
         )
+        message += _put_forward(run, run.time[starts - 1], lengths)
         yield Finding("gap", message, column="time", row=int(starts[0]) + 1, count=len(starts))
+
+
+def _put_forward(run: Run, since_s: FloatArray, lengths: FloatArray) -> str:
+    """What a gap may come from that is an hour to a sample, from a full hour of a clock without a zone on."""
+    begun = run.facts.started
+    if begun is None or begun.tzinfo is not None or run.sample_s >= 0.25 * HOUR_S:
+        return ""
+    hour = np.abs(lengths - HOUR_S - run.sample_s) < 0.5 * run.sample_s
+    if np.count_nonzero(hour) != 1:
+        return ""
+    last = begun + timedelta(seconds=float(since_s[hour][0]))
+    next_s = 60.0 * last.minute + last.second + 1e-6 * last.microsecond + run.sample_s
+    # The clock goes on from the first sample that the hour would have held.
+    if not HOUR_S - 0.25 * run.sample_s <= next_s < HOUR_S + run.sample_s:
+        return ""
+    return (
+        f"; that after {last.isoformat(' ', 'seconds')} is an hour from a full one on, as where local time "
+        "is put forward in spring: then no sample is lost; write stamps in UTC or with their zone"
+    )
 
 
 def _irregular(run: Run) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ from fogml.readers import reader_of
 from fogml.runs.columns import column_spec, parse_header, stated_cell
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
-from fogml.runs.other_rate import Beside, clock_s, held_beyond, interpolated, is_held
+from fogml.runs.other_rate import Beside, clock_ends, clock_s, held_beyond, interpolated, is_held
 from fogml.runs.raw_table import RawTable, choose_vectors, moment, stored_blocks, vector_fault
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
@@ -239,7 +239,7 @@ def container_columns(
                 at, own = (_clock_of(path, stored, groups[name]) for name in (main, array.group))
                 findings.append(next(_joined_findings([(array.name, groups[array.group], array)])))
                 if source not in held:
-                    findings += held_beyond(array.name, _ends(at), _ends(own), len(own))
+                    findings += held_beyond(array.name, clock_ends(at), clock_ends(own), len(own))
                 values = interpolated(at, own, values, source in held)
             columns[source] = values
             if len(values) != count:
@@ -270,17 +270,12 @@ def _source(path: Path, stored: StoredFile, source: str | int) -> StoredArray:
     return found[0]
 
 
-def _clock_ends(path: Path, stored: StoredFile, group: Group) -> tuple[float, float]:
-    """First and last time of a group [s]."""
+def _clock_ends(path: Path, stored: StoredFile, group: Group, rows: int = 256) -> tuple[float, float]:
+    """First and last time of a group [s], by so many `rows` at either end: at ends, readings may be none."""
     cell, array = group.column("time")
     count = max(array.shape)
-    ends = [stored.read(array, i, i + 1)[0] for i in (0, count - 1)] if count else [np.nan, np.nan]
-    first, last = (float(end) * clock_s(cell, path.name) for end in ends)
-    return first, last
-
-
-def _ends(times: FloatArray) -> tuple[float, float]:
-    return float(np.nanmin(times)), float(np.nanmax(times))
+    parts = [stored.read(array, *ends) for ends in ((0, min(rows, count)), (max(count - rows, 0), count))]
+    return clock_ends(np.concatenate(parts) * clock_s(cell, path.name))
 
 
 def _clock_of(path: Path, stored: StoredFile, group: Group) -> FloatArray:

@@ -15,7 +15,7 @@ from fogml.errors import InputError, listed, quoted
 from fogml.folders import with_slashes
 from fogml.outputs import scratch_folder
 from fogml.readers import READERS, UNCALCULATED, reader_of, reader_of_content
-from fogml.runs.columns import column_spec, parse_header
+from fogml.runs.columns import DUTY, column_spec, parse_header
 from fogml.runs.csv_dialect import has_rows, is_sure
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, empty_file
@@ -51,6 +51,7 @@ class HeldText:
         self.path = held.enter_context(scratch_folder()) / path.name
         self.findings: tuple[Finding, ...] = ()
         self.durations: Collection[int] = ()
+        self._switches: dict[int, int] = {}
         self._of = path, kind, limits
         try:
             self._unpack(path, kind, limits)
@@ -68,6 +69,7 @@ class HeldText:
             elif not has_rows(first):
                 self.check_values("")
             self.durations = stored.told.get("durations", {}).get(array.name, ())
+            self._switches = dict(stored.told.get("switches", {}).get(array.name, ()))
             if array.name in stored.told.get("hidden", ()):
                 message = (
                     f"the hidden sheet {quoted(array.name)} is read, as no sheet that is shown holds a run"
@@ -92,8 +94,15 @@ class HeldText:
         ------
         InputError
             If a column of the run format is empty, save one row perhaps from which formulas go on, and the
-            workbook has formulas without values.
+            workbook has formulas without values; or if one that is no switch holds TRUE or FALSE.
         """
+        for place, name in enumerate(parse_header(cell)[0] for cell in table.cells):
+            spec = column_spec(name)
+            if place in self._switches and spec is not None and spec.internal != DUTY:
+                where = f"{self._of[0].name}, line {self._switches[place]}, column '{name}'"
+                raise InputError(
+                    f"{where}: holds TRUE or FALSE, where a number was expected; correct the cell"
+                )
         for cell, values in table.columns.items():
             self.check_column(parse_header(cell)[0], int(np.isfinite(values).sum()), len(values))
         named = table.row_name

@@ -89,7 +89,7 @@ def on_gyro_rows(
             f"'{name}' is of another rate, {len(held)} values in {len(time)} rows; {how} at its true times"
         )
         findings.append(Finding("other_rate", message, column=name, row=int(held[0]) + 1, count=len(held)))
-        findings += held_beyond(name, _ends(time[rows]), _ends(time[held]), len(held))
+        findings += held_beyond(name, clock_ends(time[rows]), clock_ends(time[held]), len(held))
     return filled, rows, tuple(findings)
 
 
@@ -130,8 +130,10 @@ def held_beyond(
     return [Finding("held_beyond", message, column=name)]
 
 
-def _ends(times: FloatArray) -> tuple[float, float]:
-    return float(times[0]), float(times[-1])
+def clock_ends(times: FloatArray) -> tuple[float, float]:
+    """First and last of times, in any order, those apart that are none; NaN where all are none."""
+    sound = times[np.isfinite(times)]
+    return (float(sound.min()), float(sound.max())) if len(sound) else (float("nan"), float("nan"))
 
 
 def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray, hold: bool = False) -> FloatArray:

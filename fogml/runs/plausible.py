@@ -203,7 +203,7 @@ def _hot(run: Run, names: Sequence[str]) -> Iterator[Finding]:
 
 
 def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
-    """A clock in minutes, hours or days under a header with [s]."""
+    """A clock in another unit than its header says."""
     time = run.time
     if SPREADSHEET_DAYS[0] <= time[0] and time[-1] <= SPREADSHEET_DAYS[1] and run.sample_s < 60.0 / DAY_S:
         told = (
@@ -225,8 +225,8 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
         if moved[fast].sum() >= FAR_DEGC:
             told = (
                 f"'{name}' moves by {short(moved[fast].sum())} degC in {short(within_s[fast].sum())} s in "
-                "all, faster than a chamber takes a gyro: is the clock in minutes, hours or days? Write its "
-                "header as 'time [min]', 'time [h]' or 'time [d]'"
+                "all, faster than a chamber takes a gyro: is the clock in a longer unit than its header "
+                "says? Write 'time [s]', 'time [min]', 'time [h]' or 'time [d]'"
             )
             yield Finding("implausible_clock", told, column="time", count=len(run))
             return

@@ -306,4 +306,4 @@ def _facts(profile: ImportProfile, axis: str | None, overriding: Facts | None, t
         values.update({key: getattr(layer, key) for key in layer.model_fields_set})
     notes = [*profile.notes, *(layer.notes for layer in layers if layer.notes)]
     values["notes"] = " ".join(notes) or None
-    return Facts(**values)  # type: ignore[arg-type]
+    return Facts(**values)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.lib.stride_tricks import sliding_window_view
 
 from fogml.runs.checks import check_run
+from fogml.runs.facts import Facts
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import Run
 from fogml.signals.bases import lag
@@ -144,6 +147,19 @@ class TestSilentOnSoundRuns:
 
 
 class TestGapsAndSampling:
+    @pytest.mark.parametrize(
+        ("first", "zone", "told"), [("01:50", None, 1), ("01:47", None, 0), ("01:50", UTC, 0)]
+    )
+    def test_an_hour_that_local_time_skips_in_spring_is_told_as_that(self, first, zone, told):
+        """A gap of an hour at another minute, or on a clock with a zone, is one."""
+        time = 10.0 * np.arange(240.0)
+        time[60:] += 3600.0
+        columns = {"time": time, "gyro": np.sin(time), "T": 20.0 + 0.01 * time}
+        started = datetime.fromisoformat(f"2026-03-29T{first}").replace(tzinfo=zone)
+        (gap,) = (f for f in check_run(Run("run", columns, Facts(started=started))) if f.code == "gap")
+        assert gap.count == 1
+        assert ("after 2026-03-29 01:59:50 is an hour" in gap.message) == bool(told)
+
     def test_gaps_are_counted_and_the_longest_named(self):
         columns = noisy()
         keep = np.ones(20_000, dtype=bool)

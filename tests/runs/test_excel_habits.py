@@ -149,6 +149,20 @@ def test_a_hidden_sheet_is_read_where_no_other_holds_a_run_and_is_told(tmp_path)
     assert "'data'" in finding.message
 
 
+def test_true_and_false_are_a_switch_and_no_temperature(tmp_path):
+    header = ["time [s]", "gyro [deg/h]", "T [degC]", "heater [0/1]"]
+    rows = [[i, 1.0 + 0.1 * (i % 3), 20.0 + i % 7, i % 2 == 1] for i in range(40)]
+    path = tmp_path / "run.xlsx"
+    book_of(path, [("run", False, [header, *rows])])
+    assert read_run(path).columns["heater"].tolist() == [i % 2 for i in range(40)]
+    rows[4][2] = True
+    book_of(path, [("run", False, [header, *rows])])
+    with pytest.raises(
+        InputError, match=r"run.xlsx, line 6, column 'T': holds TRUE or FALSE, where a number"
+    ):
+        read_run(path)
+
+
 def test_a_second_sheet_with_a_run_is_told(tmp_path):
     other = [RUN[0], *([t, g + 100.0, a, b] for t, g, a, b in RUN[1:])]
     sheets = [

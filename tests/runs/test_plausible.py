@@ -52,6 +52,7 @@ GIVEN_AWAY = {
         {"temperature_dropouts"},
     ),
     "hours stated as s": ({"time": SOUND["time"] / 3600.0}, {"implausible_clock"}),
+    "s stated as ms": ({"time": SOUND["time"] / 1000.0}, {"implausible_clock"}),
     "days of a spreadsheet": ({"time": 45000.0 + SOUND["time"] / 86400.0}, {"implausible_clock"}),
     "a clock that began days ago": ({"time": 45000.0 + SOUND["time"]}, set()),
     "us stated as s": ({"time": 1e6 * SOUND["time"]}, {"implausible_clock"}),
