@@ -295,7 +295,8 @@ def _check_header(file: str, dialect: CsvDialect, row: Sequence[str]) -> None:
         found = "holds numbers" if dialect.cells else "names no columns"
         raise InputError(
             f"{file}, line {dialect.header_line}: no header, the first line {found}; "
-            "write a header such as 'time [s],gyro [deg/h],T [degC]'"
+            "write a header such as 'time [s],gyro [deg/h],T [degC]', or correct the profile that "
+            f"'fogml import {printable(file)} --draft -o profile.yaml' writes"
         )
 
 

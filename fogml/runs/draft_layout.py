@@ -18,6 +18,7 @@ from fogml.runs.csv_dialect import decoded_head
 from fogml.runs.csv_header import Header, fields_of, is_number_like, labview_header, with_cells_above
 from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
 from fogml.runs.header_spelling import canonical_cells, with_units_below
+from fogml.runs.logger_lines import mark_of_line_stamps, stamp_apart
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.yaml_text import parse_yaml
 
@@ -45,14 +46,16 @@ class Field:
 def text_layout(path: Path) -> tuple[list[str], list[Field]]:
     """The layout's keys and the fields of a text file."""
     head, encoding = decoded_head(path)
-    name, lines, data = _table_of(head)
+    stamp = mark_of_line_stamps(head.splitlines()[-MOST_ROWS:])
+    name, lines, data = _table_of(head, stamp)
     mark = SEPARATORS[name]
     if data is None:
         raise InputError(f"{path.name}: no rows of numbers in its first lines; a draft needs some")
     rows = [_split(line, mark) for line in lines[data : data + MOST_ROWS] if line.strip()]
     width = len(rows[0])
     marks = marks_of(CsvSource(path), rows, mark or " ")
-    layout = [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
+    layout = [f"line_stamp: {as_yaml(stamp)}"] if stamp is not None else []
+    layout += [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
     if encoding not in ("utf-8-sig", "utf-8"):
         layout.append(f"encoding: {encoding}")
     header = _Header.above(lines, data, width, mark)
@@ -69,7 +72,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field]]:
             told = as_yaml(lines[header.line].strip()[:60])
             layout.append(f"header_text: {told}    # the header is the first line that holds this")
         fields = [Field(cell.strip(' "'), *parse_header(right)) for cell, right in header.cells]
-    below = _are_below(path, encoding, mark, rows)
+    below = _are_below(path, encoding, mark, rows, stamp)
     with_units = header is not None and header.with_units and not header.is_by_place
     if with_units or below:
         keys = ["not_numbers: true", *(["wrong_field_count: true"] if below else [])]
@@ -135,10 +138,13 @@ def _are_names(cells: Sequence[str]) -> bool:
     return Header(0, 1, "", canonical_cells([cell.strip(' "') for cell in cells])).is_sure
 
 
-def _are_below(path: Path, encoding: str, mark: str | None, rows: Sequence[Sequence[str]]) -> bool:
+def _are_below(
+    path: Path, encoding: str, mark: str | None, rows: Sequence[Sequence[str]], stamp: str | None
+) -> bool:
     """Whether lines other than of numbers stand below them, or such as lack one that every row has."""
     wide = encoding if encoding.startswith("utf-16") else None
     tail = CsvSource(path, wide).tail(_TAIL_BYTES).decode(errors="replace").rstrip("\0")
+    tail = tail if stamp is None else stamp_apart(tail, stamp, mark)
     lines = [_split(line, mark) for line in re.split(r"\r\n|\r|\n", tail)[1:] if line.strip()]
     width = len(rows[0])
     # Of a short file the last of them are those that stand below.
@@ -148,11 +154,11 @@ def _are_below(path: Path, encoding: str, mark: str | None, rows: Sequence[Seque
     return any(len(f) != width or not all(is_number_like(f[i].strip(' "')) for i in held) for f in lines)
 
 
-def _table_of(text: str) -> tuple[str, list[str], int | None]:
+def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None]:
     """The separator's name, the lines, and the first line of numbers."""
-    lines = re.split(r"\r\n|\r|\n", text)[:-1] or [text]
-    best: tuple[float, str, int | None] = (0.0, "comma", None)
+    best: tuple[float, str, list[str], int | None] = (0.0, "comma", _lines(text), None)
     for name, mark in SEPARATORS.items():
+        lines = _lines(text if stamp is None else stamp_apart(text, stamp, mark))
         rows = [_split(line, mark) for line in lines[-MOST_ROWS:] if line.strip()]
         counts = [len(row) for row in rows]
         width = max(set(counts), key=counts.count) if counts else 0
@@ -162,8 +168,13 @@ def _table_of(text: str) -> tuple[str, list[str], int | None]:
         numbers = [sum(is_number_like(f.strip(' "')) for f in row) for row in rows]
         score = float(np.median(numbers)) if numbers else 0.0
         if first is not None and score > best[0]:
-            best = (score, name, first)
-    return best[1], lines, best[2]
+            best = (score, name, lines, first)
+    return best[1:]
+
+
+def _lines(text: str) -> list[str]:
+    """The lines of a text, but for the last one, which may be cut."""
+    return re.split(r"\r\n|\r|\n", text)[:-1] or [text]
 
 
 def _first_of_longest(is_data: Sequence[bool], lines: Sequence[str]) -> int | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,30 @@ def _decoded(path: Path, decoder: codecs.IncrementalDecoder, raw: bytes, read: i
             f"{path.name}: {place} is no {encoding} text; "
             "give the file's encoding in the profile (key 'encoding')"
         ) from None
+
+
+_LINE_STAMP = r"(?m)^[\[(<]?((?:[\d/.\-]+[ T])?\d{1,2}:\d\d:\d\d(?:[.:]\d+)?)"
+_AFTER_STAMP = re.compile(_LINE_STAMP + r"(\] ?|(?: \[?[RT]X\]?)?(?: ?->?|:) | \[[RT]X\] | (?=[^ ]*[,;]))")
+"""No sign is part of it: a blank or a bracket ends it."""
+
+
+def stamp_apart(text: str, mark: str, separator: str | None) -> str:
+    """A text whose lines' stamps, which end before `mark`, are fields of their own."""
+    return re.sub(_LINE_STAMP + re.escape(mark), lambda found: found[1] + (separator or "\t"), text)
+
+
+def stamps_apart(content: bytes, layout: TextLayout) -> bytes:
+    """A part of a text with its lines' stamps as fields of their own, where the layout tells of some."""
+    if layout.line_stamp is None:
+        return content
+    return stamp_apart(content.decode(), layout.line_stamp, layout.text_separator).encode()
+
+
+def mark_of_line_stamps(lines: Sequence[str]) -> str | None:
+    """What stands between a stamp and the rest of most lines, where a terminal program wrote them."""
+    marks = Counter(found[2] for line in lines if (found := _AFTER_STAMP.match(line)))
+    mark, count = max(marks.items(), key=lambda one: one[1], default=("", 0))
+    return mark if 2 * count > len(lines) else None
 
 
 _NEWLINE, _RETURN, _BLANK, _TAB, _STRAY = 10, 13, 32, 9, 31

@@ -24,6 +24,7 @@ from fogml.runs.logger_lines import (
     field_texts,
     hide_quoted,
     shown,
+    stamps_apart,
     text_parts,
 )
 from fogml.runs.other_rate import is_of_another_rate
@@ -122,7 +123,7 @@ class _Reader:
         texts: dict[str | int, list[NDArray[np.str_]]] = {}
         fields, places = 0, dict[str | int, int]()
         for content, is_last in parts:
-            lines = Lines.of(hide_quoted(content, self.profile.text_separator))
+            lines = Lines.of(hide_quoted(stamps_apart(content, self.profile), self.profile.text_separator))
             is_first = self.lines_before == 0
             numbers = np.flatnonzero(self._used(lines, is_first))
             if is_first:
@@ -182,9 +183,8 @@ class _Reader:
         if signature is not None:
             head = [self._line(lines, number) for number in range(min(_SIGNATURE_LINES, len(lines.starts)))]
             if not any(signature in line for line in head):
-                raise InputError(
-                    f"{self.file}: {quoted(signature)} was expected in its first lines; {self.hint}"
-                )
+                told = f"{quoted(signature)} was expected in its first lines"
+                raise InputError(f"{self.file}: {told}; {self.hint}")
 
     def _head(self, lines: Lines, numbers: IndexArray) -> tuple[IndexArray, int, dict[str | int, int]]:
         """The lines of data below the header, the fields of a row, and where each source stands."""
@@ -247,7 +247,7 @@ class _Reader:
             self._reject(f"without {fields} fields", short)
         rows = np.flatnonzero(~short)
         content = lines.keep(numbers[rows])
-        sources = {source: place for source, place in places.items() if source in self.profile.sources}
+        sources = {s: place for s, place in places.items() if s in self.profile.sources}
         values = field_numbers(content, self.profile, fields, list(sources.values()))
         texts = {s: field_texts(content, self.profile, fields, places[s]) for s in self.profile.text_sources}
         seconds = self._seconds(texts)

@@ -123,6 +123,7 @@ class TextLayout(Strict):
     separator: Literal["comma", "semicolon", "tab", "whitespace"] = "comma"
     decimal: Literal[".", ","] = "."
     signature: str | None = None
+    line_stamp: str | None = Field(default=None, min_length=1)
     skip_lines: int = Field(default=0, ge=0)
     header_text: str | None = Field(default=None, min_length=1)
     comment: str | None = Field(default=None, min_length=1)

@@ -55,6 +55,9 @@ class ImportProfile(TextLayout):
         The decimal mark.
     signature
         Text that the first 20 lines hold; another file is refused.
+    line_stamp
+        What stands between the date and time of day that a terminal program writes before each line, with
+        or without a bracket, and the line: the stamp is a field of its own then, the first.
     skip_lines
         Lines left out at the top before anything else is looked at.
     comment

@@ -363,6 +363,32 @@ def test_a_code_in_hexadecimal_that_is_a_number_now_and_then_does_not_cut_the_da
     np.testing.assert_allclose(run.gyro, 3600.0 * (7.5 + np.arange(COUNT) % 41))
 
 
+@pytest.mark.parametrize(
+    ("line", "mark"),
+    [
+        ("[2026-03-11 {}] {},{}", "] "),
+        ("[{}]{},{}", "]"),
+        ("2026-03-11 {} {},{}", " "),
+        ("{} -> {},{}", " -> "),
+        ("11.03.2026 {} [RX] - {},{}", " [RX] - "),
+        ("2026/03/11 {}: {};{}", ": "),
+        ("[2026-03-11 {}] {} {}", "] "),
+    ],
+)
+def test_stamps_of_a_terminal_before_each_line_are_its_clock(tmp_path, line, mark):
+    """No sign of a reading is taken for a part of what follows the stamp."""
+    gyro = np.where(np.arange(COUNT) % 9 == 0, 0.25, -7.25 - np.arange(COUNT))
+    seconds = [f"10:15:{i:02d}.250" for i in range(COUNT)]
+    rows = [line.format(*row) for row in zip(seconds, gyro, 20.5 + 0.1 * np.arange(COUNT), strict=True)]
+    (tmp_path / "log.txt").write_text("\n".join([*rows, ""]))
+    draft = draft_profile(tmp_path / "log.txt")
+    assert f'line_stamp: "{mark}"' in draft
+    (tmp_path / "profile.yaml").write_text(draft)
+    (run,) = import_recording(tmp_path / "log.txt", tmp_path / "profile.yaml")
+    np.testing.assert_allclose(run.gyro, 3600.0 * gyro)
+    np.testing.assert_allclose(run.time, np.arange(COUNT), atol=1e-9)
+
+
 def test_the_first_rows_of_counts_are_in_counts(tmp_path):
     rows = "".join(f"{i},{1000 + i % 7}\n" for i in range(COUNT))
     (tmp_path / "log.csv").write_text("time [s],gyro [count]\n" + rows)
