@@ -79,6 +79,7 @@ ANSWERED = {
     "empty.csv": (text(rows=[]), "a header and no samples; rows of numbers were expected below it"),
     "nounits.csv": (text("time,gyro,T_in,T_out"), r"'time' states no unit; write 'time \[s\]' in the header"),
     "zero.csv": ("", "the file is empty; a header and samples were expected"),
+    "zeros.csv": ("\0" * 2_000_000, "the file is empty; a header and samples were expected"),
 }
 NO_TEMPERATURE = text("time [s],gyro [deg/h]", [",".join(row.split(",")[:2]) for row in ROWS])
 ANSWERS = {name: content for name, (content, _) in ANSWERED.items()} | {"notemp.csv": NO_TEMPERATURE}

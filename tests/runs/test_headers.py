@@ -99,7 +99,7 @@ FILES = {
     "quotes": lines('"time [s]","gyro [deg/h]","T_in [degC]"', [f'"{r}"'.replace(",", '","') for r in PLAIN]),
     "carriage returns": lines().replace("\n", "\r"),
     "zero bytes in fields": lines(rows=[row + "\0\0" for row in PLAIN]),
-    "zero bytes at the end": lines() + "\0" * 5000,
+    "zero bytes at the end": lines() + "\0" * 3_000_000,
     "ISO": lines(rows=stamped(lambda m: m.isoformat(" "))),
     "ISO with a zone": lines("Timestamp,gyro_dph,T_in_C", stamped(lambda m: f"{m.isoformat()}+02:00")),
     "days first": lines(

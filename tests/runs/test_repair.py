@@ -80,9 +80,12 @@ TICKS = np.cumsum(np.random.default_rng(3).integers(9_000, 11_000, 4000))
 def test_a_wrapped_counter_is_unwrapped(tmp_path, bits, start):
     ticks = TICKS if bits > 16 else np.cumsum(np.full(4000, 700))
     path = file_of(tmp_path, ".parquet", (ticks + start) % 2**bits, np.arange(4000.0), unit="us")
-    with pytest.raises(InputError, match=rf"counter of {bits} bits of 1e-06 s wraps.*--repair unwraps it$"):
+    turns = int(np.ptp((ticks + start) // 2**bits))
+    wraps = "wraps once" if turns == 1 else f"wraps {turns} times"
+    with pytest.raises(InputError, match=rf"counter of {bits} bits of 1e-06 s {wraps};.*--repair unwraps it$"):
         read_run(path)
     run = read_run(path, repair=True)
+    assert counts(run) == {"repaired_wrap": turns}
     np.testing.assert_allclose(np.diff(run.time), 1e-6 * np.diff(ticks), rtol=1e-9)
     assert run.gyro.tolist() == list(range(4000))
 
