@@ -76,7 +76,8 @@ def test_nothing_against_is_use() -> None:
     found = advice_on(judgement())
     assert (found.grade, found.brief) == ("use", "judged on a run it has not seen")
     # The end of a range that only the turning table reaches speaks against no drift model.
-    assert advice_on(judgement(findings=(TURNING_CUT,))).grade == "use"
+    turning = judgement(findings=(TURNING_CUT,))
+    assert advice_on(turning).grade == "use" and turning.test[0].saturated is None
 
 
 @pytest.mark.parametrize(
