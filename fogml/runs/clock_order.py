@@ -117,6 +117,10 @@ def in_order(
         return Ordered(clock.rows, time, (slice(0, len(time)),))
     if float(np.ptp(time)) == 0.0:
         return Ordered(clock.rows, time, (slice(0, len(time)),), hopeless="it stands still")
+    if np.all(time[1:] <= time[:-1]):
+        told = "the rows stand newest first", "turns them round", "turned round"
+        clock.note("repaired_order", *told, int(np.argmax(time < time[0])), len(time))
+        clock.take(clock.rows[::-1])
     _unwrap(clock, tick_s)
     _add_back(clock)
     _drop_repeats(clock, columns)
@@ -254,15 +258,10 @@ def _legs(clock: _Clock) -> list[slice] | None:
 
 def _sort(clock: _Clock, part: slice, count: int, row: int) -> None:
     order = part.start + np.argsort(clock.time[part], kind="stable")
-    clock.rows[part], clock.time = clock.rows[order], _replaced(clock.time, part, clock.time[order])
+    clock.rows[part] = clock.rows[order]
+    clock.time = np.concatenate([clock.time[: part.start], clock.time[order], clock.time[part.stop :]])
     told = f"rows are out of place, {counted(count, 'time')}, first at {clock.row_name(row)}"
     clock.note("repaired_order", told, "sorts the rows", "sorted", row, count)
-
-
-def _replaced(values: FloatArray, part: slice, new: FloatArray) -> FloatArray:
-    values = values.copy()
-    values[part] = new
-    return values
 
 
 def _sorting_mends(time: FloatArray) -> bool:

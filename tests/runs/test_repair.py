@@ -90,6 +90,18 @@ def test_a_wrapped_counter_is_unwrapped(tmp_path, bits, start):
     assert run.gyro.tolist() == list(range(4000))
 
 
+@pytest.mark.parametrize("stamps_of", [1, 2])
+def test_a_record_with_its_newest_rows_first_is_turned_round(tmp_path, stamps_of):
+    """Rows of one stamp among them, as of a logger whose clock tells whole seconds."""
+    even = np.arange(400) / stamps_of
+    path = file_of(tmp_path, ".csv", np.floor(even)[::-1], np.arange(400.0)[::-1])
+    with pytest.raises(InputError, match="newest first.*correct it, or --repair turns them round"):
+        read_run(path)
+    run = read_run(path, repair=True)
+    assert run.gyro.tolist() == list(range(400)) and counts(run)["repaired_order"] == 400
+    np.testing.assert_allclose(run.time, even, atol=1e-6)
+
+
 def test_a_signed_counter_too(tmp_path):
     ticks = (TICKS - TICKS[2000] + 2**31 + 2**31) % 2**32 - 2**31
     run = read_run(file_of(tmp_path, ".parquet", ticks, np.arange(4000.0), unit="us"), repair=True)
