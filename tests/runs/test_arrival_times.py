@@ -14,11 +14,11 @@ from tests.runs.files import write_table
 ROWS, INTERVAL = 6000, 0.1
 
 
-def arrival(size, jitter=0.0, drift=0.0, gap=0.0):
+def arrival(size, jitter=0.0, drift=0.0, gap=0.0, at=ROWS // 2):
     """True times, and those of arrival: bursts of samples 2 ms apart, late by up to `jitter` periods."""
     index = np.arange(ROWS)
     true = INTERVAL * (index + 0.5 * drift * index**2 / ROWS)
-    true[ROWS // 2 :] += gap
+    true[at:] += gap
     last = np.minimum(index // size * size + size - 1, ROWS - 1)
     late = np.random.default_rng(5).uniform(0.0, jitter * size * INTERVAL, ROWS // size + 1)
     return true, true[last] + late[index // size] + 0.002 * (index % size - size + 1)
@@ -44,9 +44,13 @@ def test_drift_of_the_clock_is_followed_and_a_real_gap_kept():
     time, finding = sampling_times({"time": times, "gyro": np.zeros(ROWS)})
     assert np.ptp(time - true) < 0.01 * INTERVAL
     assert "drift 1" in finding.message or "drift 2" in finding.message  # 2000 ppm, from start to end
-    true, times = arrival(5, gap=7.0)
+
+
+@pytest.mark.parametrize("at", [15, ROWS // 2, ROWS - 10])
+def test_a_real_gap_is_kept_however_few_bursts_are_on_one_side(at):
+    true, times = arrival(5, gap=7.0, at=at)
     run = Run("run", {"time": times, "gyro": np.zeros(ROWS)})
-    assert run.gap_starts.tolist() == [ROWS // 2]
+    assert run.gap_starts.tolist() == [at]
     assert np.ptp(run.time - true) < 0.01
 
 

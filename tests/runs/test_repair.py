@@ -82,7 +82,9 @@ def test_a_wrapped_counter_is_unwrapped(tmp_path, bits, start):
     path = file_of(tmp_path, ".parquet", (ticks + start) % 2**bits, np.arange(4000.0), unit="us")
     turns = int(np.ptp((ticks + start) // 2**bits))
     wraps = "wraps once" if turns == 1 else f"wraps {turns} times"
-    with pytest.raises(InputError, match=rf"counter of {bits} bits of 1e-06 s {wraps};.*--repair unwraps it$"):
+    with pytest.raises(
+        InputError, match=rf"counter of {bits} bits of 1e-06 s {wraps};.*--repair unwraps it$"
+    ):
         read_run(path)
     run = read_run(path, repair=True)
     assert counts(run) == {"repaired_wrap": turns}
