@@ -145,6 +145,22 @@ def test_streams_give_the_same_sample_by_sample(
     np.testing.assert_allclose([step[0] for step in steps], values, rtol=1e-9, atol=1e-11 * size)
 
 
+@pytest.mark.parametrize(("seed", "window_s"), [(119, 2.0), (2, 3.5), (98, 8.0)])
+def test_a_block_that_is_full_at_a_short_interval_takes_samples_back(seed: int, window_s: float) -> None:
+    """Half of what is known by then is half an interval less than a block: the newest one was that short."""
+    time = np.cumsum(1.0 + 0.6 * np.random.default_rng(seed).uniform(-1.0, 1.0, 30))
+    x = np.random.default_rng(seed).normal(size=30)
+    stream = streams.BlockDifferenceStream(window_s, 1.0)
+    found, counts = [], []
+    for t, v in zip(time.tolist(), x.tolist()):
+        found.append(stream.step(t, v)[0])
+        counts.append(len(stream._newest))
+    assert np.diff(counts).max() > 1
+    wanted, *_ = by_definition("block", time, x, window_s, 1.0, None)
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+    np.testing.assert_allclose(block_difference(time, x, window_s, 1.0).values, wanted, atol=1e-12)
+
+
 @settings(max_examples=60, deadline=None)
 @given(recordings(), st.sampled_from(["block", "slope", "exp", "first"]), st.integers(0, 160))
 def test_no_value_depends_on_later_samples(
