@@ -115,9 +115,10 @@ def test_up_is_down_reversed_and_gyrocompass() -> None:
 
 
 def test_bad_settings_are_refused() -> None:
-    for latitude in (90.0, float("nan")):
-        with pytest.raises(InputError, match="latitude"):
+    for latitude in (89.1, 90.0, float("nan")):
+        with pytest.raises(InputError, match="from -89 to 89 is needed"):
             constant_drift(0.01, [1.0], latitude)
+    assert np.isfinite(constant_drift(0.01, [1.0], -89.0).heading_deg).all()
     with pytest.raises(InputError, match="axis"):
         constant_drift(0.01, [1.0], 30.0, "x")
     with pytest.raises(InputError, match="not finite"):

@@ -16,6 +16,7 @@ from fogml.lab.rate_json import rate_json, unit_facts
 from fogml.lab.rate_pieces import find_oscillations, find_plateaus, merged
 from fogml.lab.rate_programmes import rate_runs
 from fogml.lab.rate_response import bandwidth, gain_of
+from fogml.lab.rate_temperature import temperature_sensitivity
 from fogml.lab.rate_tests import Answer, Criteria, least_seen
 from fogml.lab.rate_words import bracketed, result_rows
 from fogml.pictures import Curve
@@ -75,6 +76,17 @@ def test_temperature_sensitivity_is_the_sum_of_its_causes() -> None:
     assert sensed["ppm_per_degC"] == pytest.approx(35.0, rel=1e-3)
     assert abs(sensed["curvature_ppm_per_degC2"]) < 1e-3
     assert of_a_twin()["notes"] == []
+
+
+def test_the_order_of_runs_at_a_temperature_each_says_nothing() -> None:
+    runs = []
+    for seed, degrees in enumerate([-20.0, 10.0, 25.0, 60.0]):
+        run = by_hand(np.array([0.0, 20.0, -20.0, 40.0, -40.0, 0.0]), seed=seed)
+        runs.append(Run(f"at {degrees}", {**run.columns, "T": np.full(len(run), degrees)}, run.facts))
+    one, other = (temperature_sensitivity(order, 3600.0, 3.6e5) for order in (runs, runs[2:] + runs[:2]))
+    assert one is not None and other is not None
+    assert other.ppm_per_degC == pytest.approx(one.ppm_per_degC, rel=1e-9)
+    assert other.se == pytest.approx(one.se, rel=1e-9) and abs(one.ppm_per_degC) < 4.0 * one.se
 
 
 def test_a_scale_factor_over_temperature_is_no_nonlinearity() -> None:
