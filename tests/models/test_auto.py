@@ -16,6 +16,7 @@ from fogml.models.auto import AutoModel
 from fogml.models.candidates import STANDARD, Candidate, Score, candidates_for, choose
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
+from fogml.models.weighing import weigh
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 
@@ -293,3 +294,22 @@ def test_each_sensor_is_written_out(linear_only: None) -> None:
     model = AutoModel(features="{sensor}").fit(run)
     assert model.feature_names == ["T_in", "T_out"]
     assert any(candidate["name"] == "T_in, T_out" for candidate in model.selection_)
+
+
+@pytest.mark.parametrize("bumps", [1.0, 0.0])
+def test_a_network_stands_alone_where_it_leaves_clearly_less(bumps: float) -> None:
+    """Two bumps in temperature, at five rates each way, that no polynomial follows; or a straight line."""
+
+    def drifting(seed: int) -> tuple[Run, np.ndarray]:
+        moved = 1.0 + np.cumsum(np.repeat([0.6, 2.0, 5.0, 1.2, 3.2], 50))
+        T = np.abs((moved + 7.0 * seed) % 100.0 - 50.0) - 5.0
+        bump = 3.0 * np.exp(-0.5 * ((T - 30.0) / 4.0) ** 2) - 2.0 * np.exp(-0.5 * ((T - 5.0) / 3.0) ** 2)
+        drift = bumps * bump + (1.0 - bumps) * 0.05 * T
+        gyro = drift + 0.1 * np.random.default_rng(seed).standard_normal(250)
+        return Run(f"{seed}.csv", {"time": 60.0 * np.arange(250), "gyro": gyro, "T": T}), drift
+
+    found = weigh([drifting(0)[0], drifting(1)[0]], Candidate("T", network=True), None, 0, False)
+    run, drift = drifting(2)
+    assert (found.model.kind == "rbf") is (found.told().startswith("made of 100 % RBF")) is (bumps > 0.0)
+    assert np.std(found.model.predict(run) - drift) < 0.05 * np.std(drift)
+    assert found.left < 0.2 * found.mean_left

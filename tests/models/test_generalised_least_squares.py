@@ -118,3 +118,11 @@ def test_the_size_of_noise_as_slow_as_others_is_found(size: float) -> None:
         found.append(noise.model.K / others.K)
     # 200 rows tell the size of a walk above the white noise to a sixth, six tables to a fifteenth.
     assert np.median(found) == pytest.approx(size, rel=0.3), found
+
+
+def test_a_column_that_never_moves_says_nothing_of_the_noise() -> None:
+    rows = rows_of(np.random.default_rng(1), 0.05, 0.02)
+    beside = table(np.column_stack([rows.X, np.full(len(rows), 7.0)]), rows.y)
+    others = NoiseModel(0.05 * np.sqrt(STEP_S) / 60.0, K=0.02 * np.sqrt(3600.0 / STEP_S))
+    found = [runs_noise(t, 0.05).like_others(t, others, 0.8).model.K for t in (rows, beside)]
+    assert found[1] == pytest.approx(found[0], rel=0.01)

@@ -8,6 +8,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.models.names import make_model
 from fogml.models.sklearn_model import SklearnModel
+from fogml.models.table import training_table
 from fogml.testing import check_model
 from fogml.testing.models import synthetic_run
 
@@ -79,6 +80,10 @@ def test_gaussian_process_is_tuned_once_and_useful(train):
     assert process.kernel_ != process.kernel
     left = train.error_deg_h - model.predict(train)
     assert left[127:].std() < 0.6 * train.error_deg_h[127:].std()
+    half = training_table([train], model.features_, 120)
+    again = model._refitted(half.take(np.arange(0, len(half), 2))).regressor_[-1]
+    np.testing.assert_array_equal(again.kernel_.theta, process.kernel_.theta)
+    assert len(again.X_train_) == (len(half) + 1) // 2
 
 
 def test_warnings_of_convergence_go_to_the_card(train):

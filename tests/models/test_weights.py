@@ -166,3 +166,4 @@ def test_a_model_weighed_with_itself_is_as_uncertain_as_that_model(weights):
     one = LinearRegressor().fit(T[:, None], 2.0 * T + rng.normal(size=200))
     _, both = combined([(Features("T"), one)] * 2, np.array(weights), 0.0)
     np.testing.assert_allclose(both.standard_errors(), sum(weights) * one.standard_errors())
+    np.testing.assert_allclose(both.covariance_, sum(weights) ** 2 * one.covariance_)
