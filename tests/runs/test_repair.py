@@ -97,7 +97,7 @@ def test_a_record_with_its_newest_rows_first_is_turned_round(tmp_path, stamps_of
     """Rows of one stamp among them, as of a logger whose clock tells whole seconds."""
     even = np.arange(400) / stamps_of
     path = file_of(tmp_path, ".csv", np.floor(even)[::-1], np.arange(400.0)[::-1])
-    with pytest.raises(InputError, match="newest first.*correct it, or --repair turns them round"):
+    with pytest.raises(InputError, match=r"newest first.*correct it, or --repair turns them round"):
         read_run(path)
     run = read_run(path, repair=True)
     assert run.gyro.tolist() == list(range(400)) and counts(run)["repaired_order"] == 400
