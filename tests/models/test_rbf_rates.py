@@ -71,6 +71,19 @@ def test_columns_a_network_may_see() -> None:
     assert followed_columns(features).tolist() == [2, 3, 5]
 
 
+@pytest.mark.parametrize("rates", [(1.0,), (1.0, 3.0), (0.4, 1.0, 2.5)])
+@pytest.mark.parametrize(
+    "rate_of", ["dT[block, 120 s]", "diff(T)[slope, 180 s]", "diff(T)[exp, 120 s]", "diff(T)[first]"]
+)
+def test_a_difference_tells_as_many_rates_as_a_rate(rates: tuple[float, ...], rate_of: str) -> None:
+    legs = [np.arange(-20.0, 60.0, rate / 6.0)[::way] for rate in rates for way in (1, -1)]
+    T = np.concatenate(legs)
+    run = Run("ramps", {"time": 10.0 * np.arange(len(T)), "gyro": np.zeros(len(T)), "T": T})
+    features = parse_features(f"T, {rate_of}")
+    values, full, _ = features.atom_values(run)
+    assert training_rates(features, values[full]) == len(rates)
+
+
 def test_without_a_rate_nothing_is_restrained() -> None:
     features = parse_features("T, T^2")
     assert restrained_inputs(features, np.linspace(0.0, 1.0, 50)[:, None]).tolist() == [0, 1]
