@@ -66,27 +66,27 @@ def test_the_twin_that_is_written_replays_as_well_as_is_said(tmp_path, id, ampli
     assert np.median(moves) < told.after + 0.05 * told.before
 
 
-@pytest.mark.parametrize(("modelled", "skew"), [(0.0, 28.0), (5.0, 20.0), (0.0, -50.0)])
-def test_a_clock_that_is_far_out_is_told_as_far_out(tmp_path, modelled, skew):
+@pytest.mark.parametrize(("modelled", "skew", "runs"), [(0.0, 28.0, 2), (5.0, 20.0, 1), (0.0, -50.0, 1)])
+def test_a_clock_that_is_far_out_is_told_as_far_out(tmp_path, modelled, skew, runs):
     """Edges that are late by more are no multiple of edges late by less, and look like lost scale factor."""
     twin = load_twin("nominal")
     made = [
         simulate(PROGRAMME, twin.with_effect("logger_skew", skew), sample_s=20.0, seed=s).run
-        for s in range(3)
+        for s in range(runs + 1)
     ]
     had = twin.with_effect("logger_skew", modelled) if modelled else twin
-    found = diagnose(had, made[:2], made[2:], plan=False)
+    found = diagnose(had, made[:runs], made[runs:], plan=False)
     assert found.verdict == "explained"
     named = found.named[0]
     assert named.effect == "logger_skew"
     assert named.amplitude.value == pytest.approx(skew - modelled, abs=0.5)
     assert found.effects[0].amplitude == pytest.approx(skew, abs=0.05)
     found.write_model(TwinModel(twin), tmp_path / "twin.yaml")
-    left = made[2].gyro_deg_h - replay(load_twin(tmp_path / "twin.yaml"), made[2])
+    left = made[runs].gyro_deg_h - replay(load_twin(tmp_path / "twin.yaml"), made[runs])
     told = found.how_far[0]
     assert told.after < 2e-3 * told.before
     assert np.sqrt(np.mean(left**2)) < 2e-3 * np.sqrt(
-        np.mean((made[2].gyro_deg_h - replay(twin, made[2])) ** 2)
+        np.mean((made[runs].gyro_deg_h - replay(twin, made[runs])) ** 2)
     )
 
 
