@@ -10,7 +10,7 @@ import yaml
 
 from fogml.errors import InputError
 from fogml.twin.draws import drawn_twin, parameter_values
-from fogml.twin.plant.fit import _with, fit_plant
+from fogml.twin.plant.fit import FitSettings, _with, fit_plant
 from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.plant.standard import ThermalConstants
 from fogml.twin.set_up import Plant
@@ -130,6 +130,12 @@ def test_a_plant_is_fitted_to_what_was_recorded():
         fitted, truth = (getattr(c, name.removeprefix("plant.")) for c in (found.plant.constants, constants))
         assert abs(np.log(fitted / truth)) < 4.0 * sd < 0.6, name
     assert max(found.misfit_degc.values()) < 0.01  # the sensors' noise is 0.005
+
+
+def test_where_the_prior_says_more_than_the_runs_they_tell_no_plant():
+    twin = replace(load_twin("nominal"), plant=Plant(heating=SelfHeating(3.0, 3.0, 900.0)))
+    run = simulate(STEPS, twin, sample_s=60.0, columns=COLUMNS).run
+    assert fit_plant(twin, [run], FitSettings(factor=1.0001)) is None
 
 
 def test_a_plant_is_fitted_through_a_power_cycle_that_leaves_no_rows():
