@@ -100,7 +100,14 @@ class CProgram:
 
     def state_bytes(self) -> int:
         """Bytes of a state, as of every machine that aligns 64-bit numbers to 8 bytes."""
-        return int(np.frombuffer(self._run("bytes", b""), dtype="<u4")[0])
+        return self._number("bytes")
+
+    def sum_of_numbers(self) -> int:
+        """The self-test's sum of all numbers that the code holds."""
+        return self._number("sum")
+
+    def _number(self, mode: str) -> int:
+        return int(np.frombuffer(self._run(mode, b""), dtype="<u4")[0])
 
     def steps(
         self, time: Any, temperatures: Any, gyro: Any, power_cycle: tuple[int, int] | None = None

@@ -19,7 +19,7 @@ from fogml.export.c_fixed import fixed_context
 from fogml.export.c_float import float_context, input_units, literal, sensor_identifier
 from fogml.export.layout import NOISE_TICKS, Layout, Number, layout
 from fogml.export.plan import Plan
-from fogml.export.self_test import SelfTest, make_self_test
+from fogml.export.self_test import SelfTest, make_self_test, numbers_of
 from fogml.features.operators import GAP_BINS, LOST, MOST_IN_BIN
 from fogml.runs.columns import is_temperature
 from fogml.signals.clock import LEAST_SHARE
@@ -65,13 +65,13 @@ class CSource:
     numbers: dict[str, Any]
     self_test: SelfTest
 
-    def with_expected(self, outputs: Sequence[float], flags: Sequence[int]) -> CSource:
-        """The same with the self-test's expected outputs filled in."""
+    def with_expected(self, outputs: Sequence[float], flags: Sequence[int], sum: int) -> CSource:
+        """The same with what the self-test expects filled in."""
         return c_source(
             self.plan,
             self.dtype,
             self.numbers["card"],
-            replace(self.self_test, outputs=tuple(outputs), flags=tuple(flags)),
+            replace(self.self_test, outputs=tuple(outputs), flags=tuple(flags), sum=sum),
         )
 
 
@@ -116,7 +116,8 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
     numbers["constants"] = [*_clock_constants(windows, plan.sample_s, dtype), *numbers["constants"]]
     told = "\n".join(map(str, (dtype, plan.names, windows, numbers["constants"])))
     numbers["model_id"] = int(sha256(told.encode()).hexdigest()[:8], 16)
-    context = {**_shared(plan, windows), **numbers, "test": test.literals(dtype)}
+    summed = numbers_of(numbers["constants"])
+    context = {**_shared(plan, windows), **numbers, "test": test.literals(dtype), "summed": summed}
     render = templates().get_template
     files = {name: render(f"{name[6:]}.j2").render(context) for name in (HEADER, SOURCE)}
     driver = render("driver.c.j2").render(context)

@@ -250,8 +250,8 @@ def _largest(off: NDArray[Any]) -> float:
 
 def expected_outputs(
     source: CSource, program_folder: Path, flags: Sequence[str] = FLAGS
-) -> tuple[list[float], list[int]]:
-    """What the compiled source gives at the checks of its self-test, in the numbers of the code."""
+) -> tuple[list[float], list[int], int]:
+    """What the compiled source gives at its self-test's checks, in the numbers of the code, and its sum."""
     test = source.self_test
     program = CProgram(source, program_folder, flags=flags)
     kind = {"float64": np.float64, "float32": np.float32}.get(source.dtype, np.int64)
@@ -263,5 +263,8 @@ def expected_outputs(
     temperatures[test.checks[-1] :] += jump
     time = step * np.int64(test.interval_us) - np.int64(test.before_wrap_us)
     out, told = program.steps(time, temperatures, np.full(len(step), np.asarray(test.gyro).astype(kind)))
-    checks = list(test.checks)
-    return [float(value) for value in out[checks]], [int(flag) for flag in told[checks]]
+    out, told = out[list(test.checks)], told[list(test.checks)]
+    if test.atoms:
+        more = program.atoms(test.atoms, np.full(len(test.atoms), np.asarray(test.gyro).astype(kind)))
+        out, told = np.append(out, more[0]), np.append(told, more[1])
+    return out.tolist(), told.tolist(), program.sum_of_numbers()

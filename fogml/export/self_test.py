@@ -1,18 +1,24 @@
-"""The sequence that generated C carries to test itself with on the target."""
+"""What generated C carries to test itself with on the target: a sequence, points, a sum of its numbers."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from fogml.escaping import CCode
 from fogml.export.layout import Layout
 from fogml.export.plan import Plan
 from fogml.features.own import Function
 from fogml.runs.columns import is_temperature
 
 _CHECKS = 8
+_TABLE = re.compile(r"static const (\w+) (\w+)\[(\w+)\](?:\[(\w+)\])? = ")
+_NUMBER = re.compile(r"#define ([A-Z]\w*) ([^/]*[^/ ])")
+_REAL = re.compile(r"[0-9]\.|[0-9]e")
 _PERIOD = 12
 _USUAL_RATE = 2.0
 # Of chambers [degC/min], where the box tells none.
@@ -21,7 +27,7 @@ _FLOAT_TOLERANCE = {"float64": 1e-9, "float32": 2e-5}
 
 @dataclass(frozen=True)
 class SelfTest:
-    """A sawtooth of temperatures, and outputs at some of its samples.
+    """A sawtooth of temperatures and outputs at some of its samples, points of atoms, and a sum of numbers.
 
     Attributes
     ----------
@@ -36,8 +42,12 @@ class SelfTest:
         Steps from the lowest to the highest temperature.
     checks
         Steps whose output is compared.
+    atoms
+        Values below the trained box and above it, in the numbers that the code takes, shape (2, a).
     outputs, flags
-        What is expected there.
+        What is expected at the checks, then at the atoms.
+    sum
+        What is expected of the numbers.
     """
 
     first: tuple[float, ...]
@@ -47,8 +57,10 @@ class SelfTest:
     gyro: float
     period: int
     checks: tuple[int, ...]
+    atoms: tuple[tuple[float, ...], ...] = ()
     outputs: tuple[float, ...] = ()
     flags: tuple[int, ...] = ()
+    sum: int = 0
 
     @property
     def steps(self) -> int:
@@ -69,12 +81,15 @@ class SelfTest:
         def number(value: float) -> str:
             return str(int(value)) if whole else literal(value, dtype)
 
-        outputs = self.outputs or (0.0,) * len(self.checks)
+        count = len(self.checks) + len(self.atoms)
+        outputs = self.outputs or (0.0,) * count
         size = max(1.0, max(abs(value) for value in outputs))
         return {
             "steps": self.steps,
             "checks": self.checks,
-            "flags": self.flags or (0,) * len(self.checks),
+            "flags": self.flags or (0,) * count,
+            "atoms": [[number(value) for value in atoms] for atoms in self.atoms],
+            "sum": self.sum,
             "outputs": [number(value) for value in outputs],
             "first": [number(value) for value in self.first],
             "rise": [number(value) for value in self.rise],
@@ -102,12 +117,25 @@ def make_self_test(plan: Plan, windows: Layout, dtype: str, numbers: dict[str, A
         first[i] = low + 0.3 * (high - low)
         rise[i] = min(0.65 * (high - low) / period, 0.5 * fastest * interval_s / 60.0)
         jump[i] = 0.9 * (high - low) + 3.0
-    checks = (0, *np.unique(np.linspace(full_at, full_at + _PERIOD, _CHECKS - 2).astype(int)).tolist())
+    # At the begin, while windows fill, and once they are full.
+    places = np.append(max(1, full_at // 3), np.linspace(full_at, full_at + _PERIOD, _CHECKS - 2).astype(int))
+    checks = (0, *np.unique(places).tolist())
+    limits = plan.limits
+    beyond = (
+        np.stack([limits.high + limits.margin, limits.low - limits.margin]) if plan.atoms else np.empty(0)
+    )
     gyro = 1000.0 / abs(plan.arrays["scale"][0]) if plan.gives_rate else 7.5
     fixed = numbers["fixed"]
     if fixed is None:
         return SelfTest(
-            tuple(first), tuple(rise), tuple(jump), interval_us, gyro, period, (*checks, checks[-1] + 1)
+            tuple(first),
+            tuple(rise),
+            tuple(jump),
+            interval_us,
+            gyro,
+            period,
+            (*checks, checks[-1] + 1),
+            tuple(map(tuple, beyond.tolist())),
         )
     unit = fixed["temperature_value"]
     return SelfTest(
@@ -118,7 +146,23 @@ def make_self_test(plan: Plan, windows: Layout, dtype: str, numbers: dict[str, A
         round(gyro / fixed["gyro_value"]),
         period,
         (*checks, checks[-1] + 1),
+        tuple(map(tuple, np.round(beyond * 2.0 ** np.array(fixed["atom_bits"])).tolist())),
     )
+
+
+def numbers_of(lines: Iterable[str]) -> dict[str, list[Any]]:
+    """Numbers that lines of C define: names of ``whole`` and ``real`` ones, and ``tables``.
+
+    Of a table the name, which of the two it holds, and its sizes.
+    """
+    found: dict[str, list[Any]] = {"whole": [], "real": [], "tables": []}
+    for line in lines:
+        if table := _TABLE.match(line):
+            kind, name, *sizes = map(CCode, table.groups(""))
+            found["tables"].append((name, "real" if kind in ("float", "double") else "whole", *sizes))
+        elif number := _NUMBER.match(line):
+            found["real" if _REAL.search(number[2]) else "whole"].append(CCode(number[1]))
+    return found
 
 
 def _interval(plan: Plan, windows: Layout) -> tuple[float, int]:

@@ -161,15 +161,57 @@ def test_no_undefined_behaviour_and_the_self_test_holds(model_of, tmp_path, name
     program.steps(2.0 * np.arange(300), wild, np.zeros(300))
 
 
-@pytest.mark.parametrize("dtype", ["float64", "q15"])
-def test_the_self_test_notices_a_changed_number(model_of, tmp_path, dtype):
-    source = c_source(Plan.of(model_of("rbf")), dtype, [])
-    source = source.with_expected(*expected_outputs(source, tmp_path, QUICK))
-    text = source.files["fogml_model.c"]
-    line = next(line for line in text.splitlines() if line.startswith("#define CONSTANT"))
-    changed = "#define CONSTANT 0.125" if dtype == "float64" else "#define CONSTANT INT64_C(12345)"
-    source.files["fogml_model.c"] = text.replace(line, changed)
-    assert CProgram(source, tmp_path, flags=QUICK).self_test() != 0
+CHANGES = """
+#define CHANGED(number) do {{ \\
+    __typeof__(number) old = number; \\
+    number = (__typeof__(number))(old + old / 20); \\
+    if (number == old) {{ number = (__typeof__(number))(old + 1); }} \\
+    if (fogml_self_test() == 0) {{ printf("%s\\n", #number); }} \\
+    number = old; \\
+}} while (0)
+int main(void)
+{{
+    unsigned int i;
+    {changes}
+    return fogml_self_test();
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "dtype"),
+    [("mean", "float32"), ("rich", "q15"), ("memory", "float64"), ("rbf", "q31"), ("joint", "float32")],
+)
+def test_the_self_test_notices_any_number_that_changed(model_of, tmp_path, name, dtype):
+    """All of the tables and all that have a name, each by 5 %: what flags, what levels off, clocks, too."""
+    source = c_source(Plan.of(model_of(name)), dtype, [])
+    source = source.with_expected(*expected_outputs(source, tmp_path, ("-std=c99", "-w")))
+    code, mark, test = source.files["fogml_model.c"].partition("/* ---- Self-test")
+    sizes = set(re.findall(r"\[([A-Z]+)\]", code)) | {"TICKS_LIMIT", "OWN_MOST"}
+
+    def variable(found: re.Match) -> str:
+        """A number with a name as a variable; one that is the size of a table stays."""
+        stays = found[1] in sizes or found[1].startswith("READING_")
+        return found[0] if stays else f"static __typeof__({found[2]}) {found[1]} = {found[2]};"
+
+    code = re.sub(r"#define (\w+) (\S+)", variable, code)
+    code = re.sub(r"static const (\w+ [A-Z_0-9]+\[)", r"static \1", code)
+    named = re.findall(r"^static __typeof__\(.*\) (\w+) =", code, re.MULTILINE)
+    tables = re.findall(
+        r"^static (?:float|double|int\w*) ([A-Z_0-9]+)\[\w+\](\[\w+\])? =", code, re.MULTILINE
+    )
+    changes = [f"CHANGED({number});" for number in named]
+    for table, columns in tables:
+        first = f"{table}[0][0]" if columns else f"{table}[0]"
+        changes.append(f"for (i = 0; i < sizeof {table} / sizeof {first}; i++) CHANGED((&{first})[i]);")
+    main = CHANGES.format(changes="\n    ".join(changes))
+    (tmp_path / "main.c").write_text("#include <stdio.h>\n" + code + mark + test + main)
+    program = tmp_path / "changes"
+    subprocess.run(["gcc", "-w", str(tmp_path / "main.c"), "-o", str(program)], check=True)
+    done = subprocess.run([str(program)], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "")
+    if name != "mean":
+        assert {"CONSTANT", "JUMP", "SLICE_WIDTH"} <= set(named) and len(tables) >= 8
 
 
 def faulty(run: Run) -> Run:
