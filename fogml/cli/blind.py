@@ -144,9 +144,9 @@ class ScoreSettings(SuiteSettings):
 
     job: ClassVar[str] = "fogml.cli.blind_job:score_and_write"
     methods: Methods = []
-    gates: Annotated[dict[str, float], BeforeValidator(_gates)] = setting(
-        {}, "Limit on a figure of the diagnosis; 'wanted' for all.", "--gate", metavar="FIGURE=VALUE"
-    )
+    gates: Annotated[
+        dict[str, float], BeforeValidator(_gates, json_schema_input_type=dict[str, float] | list[str])
+    ] = setting({}, "Limit on a figure of the diagnosis; 'wanted' for all.", "--gate", metavar="FIGURE=VALUE")
     final: Final = False
     ledger: Ledger = LEDGER
     workers: options.Workers = 2

@@ -119,7 +119,8 @@ class NorthSettings(Settings):
     transfer: float = setting(0.0, "Time to the next position.", metavar="SECONDS")
     drift: float = setting(0.0, "Linear drift of the bias.", metavar="DEG/H/H")
     transients: Annotated[
-        list[Annotated[tuple[float, float], Field(strict=False)]], BeforeValidator(_transients)
+        list[Annotated[tuple[float, float], Field(strict=False)]],
+        BeforeValidator(_transients, json_schema_input_type=list[str | tuple[float, float]]),
     ] = setting([], "Exponential from power-on; may be repeated.", "--transient", metavar="DEG/H,SECONDS")
     start: float = setting(0.0, "Begin of the seek after power-on.", metavar="SECONDS")
     noise: float = setting(0.0, "Angle random walk, for se.", metavar="DEG/SQRT(H)", ge=0.0)

@@ -71,7 +71,7 @@ class CompareSettings(options.LimitSettings):
     leave_one_out: bool = setting(
         False, "Without --test: judge each run by models fitted on the others.", "--leave-one-out/--split"
     )
-    models: Annotated[list[str], BeforeValidator(options.names_list)] = setting(
+    models: Annotated[list[str], options.NAMES] = setting(
         ["all"],
         'Names with commas between, or "all".',
         metavar="NAME,...",
@@ -136,7 +136,11 @@ class ExportJobSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.model_jobs:export_and_write"
-    model: Annotated[list[str], BeforeValidator(_several), PlainSerializer(_one_as_text)] = placed(
+    model: Annotated[
+        list[str],
+        BeforeValidator(_several, json_schema_input_type=str | list[str]),
+        PlainSerializer(_one_as_text),
+    ] = placed(
         [],
         "MODEL...",
         "Folder of the model, or of the results of three axes.",
@@ -224,7 +228,7 @@ class SweepSettings(Settings):
     )
     test: options.TestsIfAny = []
     space: Annotated[Space, BeforeValidator(_understood)]
-    objectives: Annotated[list[str], BeforeValidator(options.names_list)] = ["rms"]
+    objectives: Annotated[list[str], options.NAMES] = ["rms"]
     folds: Literal["auto", "time", "runs"] = "auto"
     fold_count: int = 5
     trials: int = setting(50, "Trials to finish.")

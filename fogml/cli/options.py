@@ -48,7 +48,10 @@ def number_list(text: str, example: str) -> list[float]:
 
 def numbers(example: str) -> BeforeValidator:
     """What takes a list of numbers as one text with commas, too."""
-    return BeforeValidator(lambda value: number_list(value, example) if isinstance(value, str) else value)
+    return BeforeValidator(
+        lambda value: number_list(value, example) if isinstance(value, str) else value,
+        json_schema_input_type=str | list[float],
+    )
 
 
 def names_list(value: object) -> object:
@@ -58,6 +61,8 @@ def names_list(value: object) -> object:
     return value
 
 
+NAMES = BeforeValidator(names_list, json_schema_input_type=str | list[str])
+"""What takes a list of names as one text with commas, too."""
 Repairing = bool | Literal["anyway"]
 """Whether faulty rows are repaired, and ``anyway`` if however many that drops."""
 Repair = Annotated[
@@ -94,7 +99,10 @@ Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".', met
 Parameters = Annotated[
     dict[str, Any],
     option("Parameter of the model; may be repeated.", "--set"),
-    BeforeValidator(lambda value: named_values(value) if isinstance(value, list) else value),
+    BeforeValidator(
+        lambda value: named_values(value) if isinstance(value, list) else value,
+        json_schema_input_type=dict[str, Any] | list[str],
+    ),
 ]
 Averaging = Annotated[float, Field(gt=0.0), option("Averaging time of the figures.", metavar="SECONDS")]
 Strict = Annotated[
@@ -166,7 +174,7 @@ class LimitSettings(Settings):
         **RUN,
     )
 
-    @field_validator("limits", mode="before")
+    @field_validator("limits", mode="before", json_schema_input_type=dict[str, float] | list[str])
     @classmethod
     def _from_flags(cls, value: Any) -> Any:
         """``["name=value", ...]`` as flags give them, or a mapping as YAML does."""

@@ -142,7 +142,9 @@ class PlanSettings(Settings):
         metavar="EFFECT|CONSTANT",
         known=options.EFFECTS,
     )
-    separate: Annotated[list[list[str]], BeforeValidator(_groups)] = setting(
+    separate: Annotated[
+        list[list[str]], BeforeValidator(_groups, json_schema_input_type=list[str | list[str]])
+    ] = setting(
         [],
         "Effects to be told apart; one alone is to be shown; repeatable.",
         metavar="A,B",

@@ -88,7 +88,9 @@ class Space(Strict):
     window: Range | list[FiniteFloat] | FiniteFloat = 64.0
     models: dict[str, dict[str, Values]]
 
-    @field_validator("features", mode="before")
+    @field_validator(
+        "features", mode="before", json_schema_input_type=str | list[str] | dict[str, str | list[str]]
+    )
     @classmethod
     def _one_text(cls, value: object) -> object:
         """A text or a list of texts is one part."""
@@ -98,7 +100,9 @@ class Space(Strict):
             return {key: [part] if isinstance(part, str) else part for key, part in value.items()}
         return value
 
-    @field_validator("models", mode="before")
+    @field_validator(
+        "models", mode="before", json_schema_input_type=str | list[str] | dict[str, dict[str, Values] | None]
+    )
     @classmethod
     def _names_alone(cls, value: object) -> object:
         if isinstance(value, str):

@@ -12,10 +12,16 @@ import yaml
 from fogml.cli import settings as settings_module
 from fogml.cli.command import spread_values
 from fogml.cli.lab import NorthSettings
-from fogml.cli.model_commands import CompensateSettings, SweepSettings, TrainSettings
+from fogml.cli.model_commands import (
+    CompareSettings,
+    CompensateSettings,
+    ExportJobSettings,
+    SweepSettings,
+    TrainSettings,
+)
 from fogml.cli.run_commands import ImportSettings
 from fogml.cli.settings import Settings
-from fogml.cli.twin_commands import ReplaySettings, SimulateSettings
+from fogml.cli.twin_commands import PlanSettings, ReplaySettings, SimulateSettings
 from fogml.errors import InputError
 from fogml.runs.reading import read_run
 from fogml.yaml_text import parse_yaml
@@ -272,3 +278,28 @@ def test_paths_are_written_in_full_and_names_as_they_are(
     assert {k: v for k, v in changed.items() if k not in paths} == {
         k: v for k, v in stated.items() if k not in paths
     }
+
+
+@pytest.mark.parametrize(
+    ("settings", "values"),
+    [
+        (CompareSettings, {"models": "M1, none", "limits": ["rms=0.1"]}),
+        (TrainSettings, {"parameters": ["ridge=1"]}),
+        (ExportJobSettings, {"model": "results/model"}),
+        (NorthSettings, {"order": "0,90", "transients": ["0.2,600", [0.1, 60.0]]}),
+        (PlanSettings, {"separate": ["kerr,moisture", ["kerr"]]}),
+        (
+            SweepSettings,
+            {
+                "schema": "fogml.sweep/1",
+                "space": {"features": "T", "models": ["rbf"]},
+                "objectives": "rms, bytes",
+            },
+        ),
+    ],
+)
+def test_the_schema_takes_what_the_command_takes_and_writes(settings, values):
+    jsonschema = pytest.importorskip("jsonschema")
+    check = jsonschema.Draft202012Validator(settings.model_json_schema()).validate
+    check(values)
+    check(settings.model_validate(values).as_written())
