@@ -24,6 +24,7 @@ from fogml.yaml_text import parse_yaml
 
 MOST_ROWS = 200
 _TAIL_BYTES = 1 << 12
+_COMMENT_MARKS = ("#", "%", "//", ";")
 
 
 @dataclass
@@ -116,17 +117,22 @@ class _Header:
             spelled = canonical_cells(labview.cells)
             return cls(labview.line, list(zip(labview.cells, spelled)), is_by_place=True)
         split = [(i, _split(lines[i], mark)) for i in range(data) if lines[i].strip()]
+        # A mark of comments between blanks is a field too many.
+        is_marked = [len(cells) == width + 1 and cells[0] in _COMMENT_MARKS for _, cells in split]
+        split = [(i, cells[marked:]) for (i, cells), marked in zip(split, is_marked, strict=True)]
         names = [(i, cells) for i, cells in split if len(cells) == width and _are_names(cells)]
         if not names:
             return None
         line, own = names[-1]
         if len(names) > 1 and (units := with_units_below([c.strip() for c in names[-2][1]], own)):
             (line, own), known = names[-2], units
-            return cls(line, list(zip(own, known)), with_units=True)
+            return cls(line, list(zip(own, known)), with_units=True, is_by_place=any(is_marked))
         cells = [c.strip().strip('"') for c in with_cells_above(own, names[-2][1] if len(names) > 1 else [])]
         times = Counter(cell for cell in cells if cell)
-        is_by_place = max(times.values(), default=0) > 1 or any(
-            cell != raw.strip().strip('"') for cell, raw in zip(cells, own)
+        is_by_place = (
+            any(is_marked)
+            or max(times.values(), default=0) > 1
+            or any(cell != raw.strip().strip('"') for cell, raw in zip(cells, own))
         )
         return cls(line, list(zip(own, canonical_cells(cells))), is_by_place=is_by_place)
 

@@ -194,10 +194,12 @@ def _gyro(one: Field | None, many: bool) -> str:
     if one.unit is not None and is_accepted("gyro", one.unit):
         return f"{{{source}unit: {as_yaml(one.unit)}}}"
     values = one.numbers
+    degree = r"(?:deg|[°º˚])(?:_?p(?:er)?)?[/_ ]?"
     hints = (
-        ("deg/h", r"dph|deg(_?p(er)?)?_?h|grad/h"),
-        ("deg/s", r"dps|deg(_?p(er)?)?_?s|grad/s"),
-        ("rad/s", r"(?<!g)rad"),
+        ("deg/h", f"dph|{degree}h|grad/h"),
+        ("deg/s", f"dps|{degree}s|grad/s"),
+        # So ROS names what it gives in rad/s.
+        ("rad/s", r"(?<!g)rad|angular_velocity"),
     )
     text = f"{one.name} {one.unit or ''}".lower()
     unit = next((u for u, hint in hints if re.search(hint, text)), None)

@@ -35,6 +35,7 @@ _FORMS = {
         r"^\s*(?P<a>\d{4})(?P<b>\d{2})(?P<c>\d{2})\s*[T_ -]\s*(?P<H>\d{2}):?(?P<M>\d{2}):?(?P<S>\d{2})"
         r"(?:[.,](?P<F>\d{1,9}))?\s*(?P<z>Z|UTC|GMT|[+-]\d{2}:?\d{2})?\s*$"
     ),
+    "duration": r"^\s*(?P<N>\d+(?:[.,]\d+)?) (?P<U>sec|min|hr|days?)\s*$",
     "fraction of a second": r"^\s*(?P<F>\d{1,9})\s*$",
 }
 FRACTION = "fraction of a second"
@@ -43,6 +44,8 @@ _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct",
 _HOURS_OR_MINUTES = "h?"
 _NS = 1_000_000_000
 _DAY_NS = 86_400 * _NS
+_DURATIONS_NS = {"sec": _NS, "min": 60 * _NS, "hr": 3600 * _NS, "day": _DAY_NS, "days": _DAY_NS}
+"""As MATLAB writes the times of a timetable."""
 _GOES_ROUND_NS = {"time": _DAY_NS, "minutes and seconds": 3600 * _NS}
 
 
@@ -67,7 +70,7 @@ class StampForm:
         return re.match(_FORMS[self.kind], text) is not None
 
     def nanoseconds(self, texts: Array) -> tuple[IntArray, BoolArray]:
-        """Nanoseconds since 1970 (of a time of day: since midnight), and which texts are no such stamps.
+        """Nanoseconds since 1970 (of a time of day since midnight, of a duration its own); which are none.
 
         Parameters
         ----------
@@ -91,6 +94,8 @@ class StampForm:
         if "F" in parts:
             seconds, bad = _seconds(parts)
             total, wrong = total + seconds, wrong | bad
+        if "U" in parts:
+            total = total + _durations(parts["N"], parts["U"])
         return total, wrong
 
     def _days(self, a: Any, b: Any, c: Any) -> tuple[IntArray, BoolArray]:
@@ -233,6 +238,17 @@ def _month(texts: Any) -> IntArray:
     names = compute.utf8_slice_codeunits(compute.utf8_lower(texts), 0, 3)
     places = compute.index_in(names, value_set=arrow.array(_MONTHS, arrow.string()))
     return values_of(compute.fill_null(places, -1)).astype(np.int64) + 1
+
+
+def _durations(numbers: Any, units: Any) -> IntArray:
+    """Nanoseconds of numbers with their units, 0 where there are none."""
+    import pyarrow as arrow
+    import pyarrow.compute as compute
+
+    digits = compute.replace_substring(compute.fill_null(numbers, "0"), ",", ".")
+    place = compute.index_in(units, value_set=arrow.array(list(_DURATIONS_NS), arrow.string()))
+    scale = np.array(list(_DURATIONS_NS.values()))[values_of(compute.fill_null(place, 0)).astype(np.intp)]
+    return np.rint(values_of(digits.cast(arrow.float64())) * scale).astype(np.int64)
 
 
 def _seconds(parts: dict[str, Any]) -> tuple[IntArray, BoolArray]:

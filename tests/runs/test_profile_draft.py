@@ -223,6 +223,9 @@ def test_a_clock_without_a_unit_is_told_by_what_its_steps_would_be(tmp_path, ste
         ("Gyro_degph", 1.0),
         ("w_deg_per_h", 1.0),
         ("w_deg_per_sec", 3600.0),
+        ("Gyro °/h (S/N 17)", 1.0),
+        ("w deg/h (LGR S/N: 20)", 1.0),
+        ("field.angular_velocity.x", 648000.0 / np.pi),
     ],
 )
 def test_a_guess_of_the_gyros_unit_goes_by_what_the_cell_says(tmp_path, cell, factor) -> None:
@@ -342,6 +345,16 @@ def test_a_clock_that_would_show_centuries_in_seconds_counts_less(tmp_path, scal
     assert f"unit: {unit}}}    # GUESS: steps of " in draft and told in draft
     (run,) = import_recording(tmp_path / "log.csv", tmp_path / "p.yaml")
     np.testing.assert_allclose(run.time, np.arange(COUNT), atol=1e-3)
+
+
+@pytest.mark.parametrize("units", ["", "s deg/h degC"])
+def test_the_header_that_numpy_writes_behind_a_mark_names_the_columns(tmp_path, units):
+    table = np.column_stack((np.arange(COUNT), 9.5 + np.arange(COUNT) % 31, 20.0 + 0.1 * np.arange(COUNT)))
+    names = "time gyro_dph T_in" if not units else "time gyro T_in"
+    np.savetxt(tmp_path / "log.txt", table, header="\n".join([names, *([units] if units else [])]))
+    (tmp_path / "profile.yaml").write_text(draft_profile(tmp_path / "log.txt"))
+    (run,) = import_recording(tmp_path / "log.txt", tmp_path / "profile.yaml")
+    np.testing.assert_allclose(np.column_stack((run.time, run.gyro, run.columns["T_in"])), table)
 
 
 def test_a_remark_with_a_date_is_no_header(tmp_path):

@@ -74,3 +74,11 @@ def test_greenwich_is_a_zone_and_a_date_that_is_not_read_is_told_as_one(tmp_path
         InputError, match="'2026-03-23 08:00:00 CET' is no date or time of day that is read, such as"
     ):
         read_run(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize(("unit", "per_s"), [("sec", 1.0), ("min", 1.0 / 60.0), ("hr", 1.0 / 3600.0)])
+def test_times_as_matlab_writes_those_of_a_timetable(tmp_path, unit, per_s):
+    seconds = np.arange(0.0, 1800.0, 18.0)
+    rows = "".join(f"{(90.0 + s) * per_s:g} {unit},{9.5 + s:.2f},20.5\n" for s in seconds)
+    (tmp_path / "run.csv").write_text("Time,gyro [deg/h],T [degC]\n" + rows)
+    np.testing.assert_allclose(read_run(tmp_path / "run.csv").time, seconds, atol=1e-9)
