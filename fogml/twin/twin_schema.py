@@ -123,10 +123,8 @@ def _known_keys(path: list[str]) -> list[str]:
     kind: Any = TWIN_FILE
     for word in path:
         fields = getattr(kind, "model_fields", {})
-        if word in fields:
+        if word in fields:  # else a name of the user's own: of a sensor, an effect or its shape
             kind = _model_in(fields[word].annotation)
-        else:
-            kind = _Sensor if kind is dict or "single" in path else kind
     fields = getattr(kind, "model_fields", {})
     return [field.alias or name for name, field in fields.items()]
 
