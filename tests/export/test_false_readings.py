@@ -11,8 +11,9 @@ from fogml.export.c_program import CProgram
 from fogml.export.c_source import c_source
 from fogml.export.check import c_difference
 from fogml.export.false_readings import false_reading_error, false_reading_lines, false_readings
-from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
+from fogml.export.fixed_bound import _LARGEST, _STEEPEST, _TWICE, fixed_point_error, fixed_point_lines
 from fogml.export.plan import Plan
+from fogml.export.self_test import sensor_range
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
@@ -216,3 +217,19 @@ def test_a_window_that_tells_nothing_yet_is_not_beyond_the_trained_rates():
     limited, outside = plan.limited(atoms, np.array([False, True]))
     assert outside.tolist() == [False, True]
     assert limited[0].tolist() == atoms[0].tolist()
+
+
+def test_extremes_of_a_gaussian_are_where_they_are():
+    z = np.linspace(0.0, 4.0, 100_001)
+    value = np.exp(-(z**2))
+    assert np.abs(np.diff(value) / np.diff(z)).max() == pytest.approx(_STEEPEST, rel=1e-6)
+    assert ((z * value).max(), (2.0 * z**2 * value).max()) == pytest.approx((_LARGEST, _TWICE), rel=1e-6)
+
+
+def test_a_column_that_no_rate_is_told_of_crosses_its_range_in_a_quarter_of_an_hour():
+    run = training_run()
+    volts = 5.0 + 0.2 * np.sin(run.time / 700.0)
+    model = make_model("polynomial", features="T_in, supply").fit(run.with_columns(supply=volts))
+    low, high, fastest = sensor_range(Plan.of(model), "supply")
+    assert (low, high) == pytest.approx((volts.min(), volts.max()), abs=0.02)
+    assert fastest * 15.0 == pytest.approx(high - low)
