@@ -173,7 +173,7 @@ def seconds_from_first(table: LoggerTable, profile: ImportProfile) -> FloatArray
     clock = profile.clock
     if clock is None:
         assert profile.sample_s is not None
-        return np.asarray(table.rows * profile.sample_s)
+        return np.asarray((table.rows - table.rows[:1]) * profile.sample_s)
     seconds = internal(table.columns[clock], "time", profile.columns["time"])
     return large.each(lambda time: time - seconds[:1], seconds)
 

@@ -166,6 +166,19 @@ def test_a_clock_is_repaired_where_the_profile_says_so(read):
     np.testing.assert_allclose(np.diff(run.time), 256e-6)
 
 
+def test_legs_by_time_are_the_same_with_a_clock_and_with_a_sample_interval(read):
+    """Counted from the first row that is kept, wherever in the file that is."""
+    text = "t,g\n0.0,warming up\n0.5,warming up\n" + "".join(f"{0.5 * i},{i}\n" for i in range(2, 400))
+    more = "  gyro: {source: g, unit: deg/h}\nreject: {not_numbers: true}\n"
+    more += "legs: {first: {from_s: 0, to_s: 50}, second: {from_s: 50, to_s: 150}}\n"
+    found = []
+    for clock in ("columns:\n  time: {source: t, unit: s}\n", "sample_s: 0.5\ncolumns:\n"):
+        found.append(read("schema: fogml.import/1\ndescription: a bench\n" + clock + more, text))
+    for run, same in zip(*found, strict=True):
+        assert run.gyro.tolist() == same.gyro.tolist() and run.time.tolist() == same.time.tolist()
+    assert [len(run) for run in found[0]] == [100, 200] and found[0][0].gyro[0] == 2.0
+
+
 def test_fields_of_a_container_by_group(read, tmp_path):
     files.tdms(tmp_path / "log.tdms")
     profile = (
