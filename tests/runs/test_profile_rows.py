@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.runs.logger_text import read_logger_text
 from fogml.runs.profiles import import_recording, load_profile
 from fogml.runs.reading import read_run
 from tests.readers import files
@@ -134,6 +135,32 @@ def test_a_joined_log_of_another_day_or_without_dates_is_refused(read, tmp_path)
         InputError, match=r"the joined log-oven\.txt covers -17746560\d\d to .* dates in both"
     ):
         read(HEAD + COLUMNS + JOIN, log())
+
+
+@pytest.mark.parametrize("part_bytes", [120, 333, 1000])
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda text: text,
+        lambda text: text.replace("\n", "\r"),
+        lambda text: text.replace(",idle,", ',"idle, or ""off""",').removesuffix("\n"),
+        lambda text: text.replace(",3.5,", ",overload,").replace("29.03.", "# a new day\n\n29.03.", 1),
+    ],
+)
+def test_a_text_read_in_parts_is_that_read_at_once(tmp_path, changed, part_bytes):
+    (tmp_path / "own.yaml").write_text(
+        HEAD + "comment: '#'\nreject: {not_numbers: true}\n" + COLUMNS + "legs: {up: {source: State, equals: [up]}}\n"
+    )
+    (tmp_path / "log.csv").write_bytes(changed(log()).encode())
+    profile = load_profile(tmp_path / "own.yaml")
+    whole, parts = (
+        read_logger_text(tmp_path / "log.csv", profile, "own", size) for size in (1 << 20, part_bytes)
+    )
+    assert parts.total_rows == whole.total_rows and parts.rows.tolist() == whole.rows.tolist()
+    assert parts.findings == whole.findings and len(whole.rows) >= COUNT - 1
+    np.testing.assert_array_equal(parts.seconds, whole.seconds)
+    for source, values in {**whole.columns, **whole.texts}.items():
+        np.testing.assert_array_equal({**parts.columns, **parts.texts}[source], values)
 
 
 def test_columns_come_in_the_order_of_the_profile(read, tmp_path):
