@@ -311,3 +311,16 @@ def test_a_move_is_taken_up_again_from_less_than_half_its_speed_to_more(speeds, 
     course = np.interp(time, corners, np.cumsum([0.0, *(0.05 * np.array(speeds) * np.diff(corners))]))
     found = _resumptions(SimpleNamespace(time=time), course, 0, len(time))
     assert len(found) == taken_up and all(600.0 <= time[place] <= 1200.0 for place in found)
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.5, 1.0])
+def test_noisy_readings_tell_moves_within_two_minutes(noise):
+    time = np.arange(0.0, 21_600.0)
+    degrees = np.interp(time, [0.0, 3600.0, 6000.0, 9600.0, 12_000.0], [20.0, 20.0, 60.0, 60.0, 20.0])
+    read = degrees + noise * np.random.default_rng(1).normal(size=len(time))
+    found = regimes(Run("run", {"time": time, "gyro": np.zeros(len(time)), "T": read})).segments()
+    assert [name for name, *_ in found] == [
+        "soak", "ramp_up", "after_ramp", "soak", "ramp_down", "after_ramp", "soak",
+    ]  # fmt: skip
+    starts = {name: time[start] for name, start, _ in found}
+    assert (starts["ramp_up"], starts["ramp_down"]) == pytest.approx((3600.0, 9600.0), abs=120.0)
