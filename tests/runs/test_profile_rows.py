@@ -148,9 +148,8 @@ def test_a_joined_log_of_another_day_or_without_dates_is_refused(read, tmp_path)
     ],
 )
 def test_a_text_read_in_parts_is_that_read_at_once(tmp_path, changed, part_bytes):
-    (tmp_path / "own.yaml").write_text(
-        HEAD + "comment: '#'\nreject: {not_numbers: true}\n" + COLUMNS + "legs: {up: {source: State, equals: [up]}}\n"
-    )
+    more = "legs: {up: {source: State, equals: [up]}}\n"
+    (tmp_path / "own.yaml").write_text(HEAD + "comment: '#'\nreject: {not_numbers: true}\n" + COLUMNS + more)
     (tmp_path / "log.csv").write_bytes(changed(log()).encode())
     profile = load_profile(tmp_path / "own.yaml")
     whole, parts = (
