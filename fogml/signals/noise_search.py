@@ -24,6 +24,10 @@ _WORTH = 2.0
 """Nats that a filter must bring before all forms are tried."""
 _ENDS = 0.01
 """Share of a row's density that its series' ends may make."""
+_DOUBTED = 1e-3
+"""Chance of a right model's being doubted."""
+_TIMES_TRIED = 10
+"""Correlation times among which the likeliest is looked for first."""
 _TIME_TOLD = 0.01
 """Share to which a correlation time is found."""
 _TIMES = np.linspace(-2.0, 2.0, 5)
@@ -92,47 +96,32 @@ class NoiseSearch:
         return float(-np.logaddexp.reduce(-np.array(lost)))
 
 
-def search_noise(
-    spectrum: Spectrum, *, filters: bool = True, misfit_level: float = 1e-3, correlated: bool = True
-) -> NoiseSearch:
+def search_noise(spectrum: Spectrum) -> NoiseSearch:
     """Fit and weigh noise models.
 
     White noise, flicker, random walk and quantisation alone; behind low passes of first and second order
     and a running mean; and, where none of those fits, from each octave on down, the rows above being left to
     themselves. A Gauss-Markov term competes beside the terms alone and beside the best of them.
-
-    Parameters
-    ----------
-    spectrum
-        Of the data.
-    filters
-        Whether filters are looked for.
-    misfit_level
-        Chance of a right model's being doubted.
-    correlated
-        Whether a Gauss-Markov term competes.
     """
     if not np.any(spectrum.power > 0.0):
         raise InputError("noise models: the values are all the same; there is no noise to fit")
     size = np.log(max(float(spectrum.count.sum()), 2.0))
     plain = SpectrumModel(spectrum, PLAIN)
     found = [NoiseChoice(plain, plain.fit(), 0.0)]
-    if filters:
-        found += _filtered(spectrum, found[0], size)
-        best = max(found, key=lambda c: c.evidence)
-        if fit_p_value(best.model, best.fit) < misfit_level:
-            found += _from_lower_on(spectrum)
-    if correlated:
-        # Beside the terms alone too: of what is correlated a filter may have been made.
-        best = max(found, key=lambda c: c.evidence)
-        for beside in (found[0], best) if best is not found[0] else (best,):
-            found += _correlated(spectrum, beside, size)
+    found += _filtered(spectrum, found[0], size)
+    best = max(found, key=lambda c: c.evidence)
+    if fit_p_value(best.model, best.fit) < _DOUBTED:
+        found += _from_lower_on(spectrum)
+    # Beside the terms alone too: of what is correlated a filter may have been made.
+    best = max(found, key=lambda c: c.evidence)
+    for beside in (found[0], best) if best is not found[0] else (best,):
+        found += _correlated(spectrum, beside, size)
     found.sort(key=lambda c: -c.evidence)
     live = [c for c in found if c.evidence > found[0].evidence - _LIVE]
     weights = np.exp([c.evidence - live[0].evidence for c in live])
     p_value = fit_p_value(live[0].model, live[0].fit)
     # Scatter that chance explains is none: intervals would widen for nothing.
-    excess = _excess_of(live[0].model, live[0].fit) if p_value < misfit_level else 0.0
+    excess = _excess_of(live[0].model, live[0].fit) if p_value < _DOUBTED else 0.0
     if excess > 0.0:
         live = [replace(c, fit=c.model.fit(c.fit, excess=excess)) for c in live]
     return NoiseSearch(spectrum, tuple(live), weights / weights.sum(), excess, p_value)
@@ -265,7 +254,7 @@ def _from_lower_on(spectrum: Spectrum) -> list[NoiseChoice]:
         top *= 0.5
 
 
-def _correlated(spectrum: Spectrum, best: NoiseChoice, size: float, times: int = 10) -> list[NoiseChoice]:
+def _correlated(spectrum: Spectrum, best: NoiseChoice, size: float) -> list[NoiseChoice]:
     """Models with a Gauss-Markov term, where slow noise is there at all.
 
     Its correlation time is the likeliest, and some within its error about it, together as likely as that one:
@@ -292,7 +281,7 @@ def _correlated(spectrum: Spectrum, best: NoiseChoice, size: float, times: int =
         return known[log_time].fit.loss
 
     low, high = np.log([shortest, longest])
-    grid = np.linspace(low, high, times)
+    grid = np.linspace(low, high, _TIMES_TRIED)
     step = float(grid[1] - grid[0])
     first = grid[np.argmin([loss(at) for at in grid])]
     bounds = max(first - step, low), min(first + step, high)

@@ -21,7 +21,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from math import comb
 
 import numpy as np
 
@@ -96,12 +95,13 @@ def _solved(bands: FloatArray, penalty: float, values: FloatArray) -> FloatArray
     return np.asarray(solveh_banded(system, values, check_finite=False))
 
 
-def _bands(n: int) -> FloatArray:
-    """Upper bands of D'D for third differences, as `scipy.linalg.solveh_banded` takes them."""
+def _bands(n: int, lower: bool = False) -> FloatArray:
+    """Upper or lower bands of D'D for third differences, as `scipy.linalg.solveh_banded` takes them."""
     bands = np.zeros((_ORDER + 1, n))
     for i in range(_ORDER + 1):
         for j in range(i, _ORDER + 1):
-            bands[_ORDER - (j - i), j : n - _ORDER + j] += _THIRD[i] * _THIRD[j]
+            row, first = (j - i, i) if lower else (_ORDER - (j - i), j)
+            bands[row, first : n - _ORDER + first] += _THIRD[i] * _THIRD[j]
     return bands
 
 
@@ -246,7 +246,7 @@ def _within_bounds(readings: FloatArray, stiffness: float) -> FloatArray:
     lengths = np.diff([0, *edges, len(readings)])
     # A stair is one reading, however long it is.
     central = 1.0 / np.repeat(lengths, lengths)
-    rough = stiffness * _squared_differences(len(readings))
+    rough = stiffness * _bands(len(readings), lower=True)
     side = np.zeros(len(readings))
     course = readings
     for _ in range(_ROUNDS):
@@ -260,13 +260,3 @@ def _within_bounds(readings: FloatArray, stiffness: float) -> FloatArray:
             break
         side = beyond
     return course
-
-
-def _squared_differences(count: int) -> FloatArray:
-    """Lower bands of D'D, D the differences of order `_ORDER`; shape (`_ORDER` + 1, count)."""
-    taps = [(-1.0) ** k * comb(_ORDER, k) for k in range(_ORDER + 1)]
-    bands = np.zeros((_ORDER + 1, count))
-    for a, left in enumerate(taps):
-        for b, right in enumerate(taps[a:], start=a):
-            bands[b - a, a : count - _ORDER + a] += left * right
-    return bands
