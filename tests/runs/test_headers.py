@@ -225,6 +225,9 @@ def test_names_in_chinese(tmp_path):
     [
         (["t [s]", "gyro [dps]", "t [degC]"], ("time [s]", "gyro [deg/s]", "T [degC]")),
         (["time_us", "gyro_dps", "Temperature (K)"], ("time [us]", "gyro [deg/s]", "T [K]")),
+        (["Time_s", "Gyro_degph", "Tin_degC"], ("time [s]", "gyro [deg/h]", "T_in [degC]")),
+        (["t_s", "gyro_degPerHour", "T_C"], ("time [s]", "gyro [deg/h]", "T [degC]")),
+        (["t_s", "omega_radps", "T_C"], ("time [s]", "gyro [rad/s]", "T [degC]")),
         (["Time (min)", "Gyro (mdps)", "Temp [C]"], ("time [min]", "gyro [mdeg/s]", "T [degC]")),
         (["time [s]", "gyro [dph]", "Temp [C]", "T1"], ("time [s]", "gyro [deg/h]", "Temp [degC]", "T1")),
         (["time [s]", "gyro [dph]", "Temp [C]", "T_out"], ("time [s]", "gyro [deg/h]", "T [degC]", "T_out")),

@@ -220,7 +220,7 @@ def test_a_clock_without_a_unit_is_told_by_what_its_steps_would_be(tmp_path, ste
         ("Drehrate in Grad/s", 3600.0),
         ("Gyro [Grad/h]", 1.0),
         ("wx_rad", 648000.0 / np.pi),
-        ("Gyro_degph", 1.0),
+        ("w_degph", 1.0),
         ("w_deg_per_h", 1.0),
         ("w_deg_per_sec", 3600.0),
         ("Gyro °/h (S/N 17)", 1.0),
