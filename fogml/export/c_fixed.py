@@ -77,6 +77,11 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         f"deg/h ({most / 3600.0:.0f} deg/s) either way; what lies beyond stays at that end, without a flag.",
     ]
     units = units_of(plan, gyro, f"whole steps of 2^-{bits} degC, in the order of the places below")
+    width = 16 if dtype == "q15" else 32
+    ends = [
+        f"Temperatures hold {2 ** (width - 1 - bits)} degC either way. INT{width}_MIN and INT{width}_MAX are",
+        "no readings: give one of them where there is none, and for what lies beyond.",
+    ]
     exp_terms = [round((-log(2.0)) ** n / factorial(n) * 2.0**30) for n in range(10, -1, -1)]
     rates = any(o.method not in ("first", "own") or o.unit_s for o in windows.operators)
     own = own_context(plan, windows, fixed_number, "int64_t")
@@ -92,7 +97,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         **dict.fromkeys((f"{name}_type" for name in (*TYPES, "held")), "int32_t"),
         **dict.fromkeys(("real", "value_type", "exp_type"), "int64_t"),
         "temperature_type": "int16_t" if dtype == "q15" else "int32_t",
-        "units": [*units, *compensated],
+        "units": [*units, *(ends if plan.sensors else ()), *compensated],
         "constants": _constants(plan, windows, scales, dtype),
         "exp_error": EXP_ERROR,
         "exp_terms": exp_terms,

@@ -9,6 +9,7 @@ import numpy as np
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.export.plan import Plan
+from fogml.export.self_test import sensor_range
 
 OUTPUT_BITS = 12
 """Outputs are multiples of 2**-12 deg/h."""
@@ -89,10 +90,8 @@ def product_range(a: tuple[float, float], b: tuple[float, float]) -> tuple[float
 
 def sixteen_bits(plan: Plan) -> int:
     """Bits behind the point of 16-bit temperatures: the trained ones fit with a tenth to spare."""
-    most = 100.0
-    for i, atom in enumerate(plan.atoms):
-        if atom.operator == "value" and atom.signal.is_sensor:
-            most = max(most, abs(plan.limits.box_low[i]), abs(plan.limits.box_high[i]))
+    ends = (end for sensor in plan.sensors for end in sensor_range(plan, sensor)[:2])
+    most = max((100.0, *map(abs, ends)))
     return floor(log2(32767.0 / (most * _TEMPERATURE_MARGIN)))
 
 

@@ -566,6 +566,24 @@ def test_an_output_beyond_its_range_is_the_end_that_the_header_states(model_of, 
             np.testing.assert_allclose(found, np.clip(given - drift, -most, most), atol=2.0**-11)
 
 
+@pytest.mark.parametrize(
+    ("features", "hottest", "reach"), [("T_in", 70.0, 128), ("lag(T_in, 300 s)", 140.0, 256)]
+)
+def test_an_end_of_a_whole_temperatures_type_is_no_reading(tmp_path, features, hottest, reach):
+    """What is trained on is held, too, where the model remembers it alone."""
+    time = np.arange(4000.0)
+    T = hottest - 50.0 + 50.0 * np.sin(time / 500.0)
+    model = make_model("polynomial", features=features).fit(Run("hot", {"time": time, "gyro": T, "T_in": T}))
+    source = c_source(Plan.of(model), "q15", [])
+    assert f"Temperatures hold {reach} degC either way. INT16_MIN" in source.files["fogml_model.h"]
+    whole = np.round(T / source.numbers["fixed"]["temperature_value"])
+    assert np.abs(whole).max() < 2**15 - 1
+    whole[3000], whole[3500] = 2**15 - 1, -(2**15)
+    out, flag = CProgram(source, tmp_path, flags=QUICK).steps(time, whole[:, None], 0.0 * time)
+    assert np.flatnonzero(flag[2500:] == 2).tolist() == [500, 1000]
+    assert out[3000] == out[2999] and out[3500] == out[3499]
+
+
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_an_output_that_is_no_number_stays_one_for_that_sample_alone(model_of, tmp_path, dtype):
     source = c_source(Plan.of(model_of("M2")), dtype, [])
