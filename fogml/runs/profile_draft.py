@@ -26,6 +26,7 @@ _COUNT = re.compile(r"sample|index|count|packet|seq|row|^n(o|r)?\.?$|^i$|序号"
 _DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
 _GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
 _WARM = re.compile(r"temp|die|oven|therm|^t(\w{0,3}|[_.]\w*)$|温", re.IGNORECASE)
+_SET_POINT = re.compile(r"soll|set[ _-]?(point|value|temp)|target|consigne|设定", re.IGNORECASE)
 _AXIS = re.compile(r"([xyz])\W*\Z", re.IGNORECASE)
 _UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
 _UNITS = {unit: conversion("time", unit, "")[0] for unit in ("s", "ms", "us", "ns")}
@@ -86,10 +87,7 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     left = [f for f in left if f not in gyros]
     if not gyros:
         held = [f for f in left if np.isfinite(f.numbers).any() or not f.first]
-        # States and marks take few values, a code is now and then a number; a thermometer is named as one.
-        text = [int(np.isnan(f.numbers).sum()) for f in held]
-        ranks = [(bool(_WARM.search(f.name)), _takes_few(f), n) for f, n in zip(held, text, strict=True)]
-        gyros = [f for _, f in sorted(zip(ranks, held, strict=True), key=lambda one: one[0])[:1]]
+        gyros = sorted(held, key=_unlike_a_gyro)[:1]
         left = [f for f in left if f not in gyros]
     axes = {m[1].lower(): f for f in gyros if (m := _AXIS.search(f.name))}
     many = len(gyros) > 1 and len(axes) == len(gyros)
@@ -122,6 +120,12 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     return lines
 
 
+def _unlike_a_gyro(one: Field) -> tuple[bool, bool, bool, int]:
+    """What speaks against a field: a thermometer's name, another unit, few values as of a state, text."""
+    is_warm, other = bool(_WARM.search(one.name)), one.unit is not None and not is_accepted("gyro", one.unit)
+    return is_warm, other, _takes_few(one), int(np.isnan(one.numbers).sum())
+
+
 def _takes_few(one: Field) -> bool:
     """Whether a field takes few values, as a state does, or none that is a number."""
     return len(set(one.numbers[np.isfinite(one.numbers)].tolist())) < _FEW_VALUES
@@ -133,7 +137,7 @@ def _is_of_a_run(one: Field) -> bool:
         name for name in ("T", "time", "gyro") if one.unit is not None and is_accepted(name, one.unit)
     ]
     is_warm = "T" in accepted or (not accepted and bool(_WARM.search(one.name)))
-    return column_spec(one.name) is not None or is_warm
+    return column_spec(one.name) is not None or (is_warm and not _SET_POINT.search(one.name))
 
 
 def _clock(left: list[Field]) -> list[str]:
@@ -215,12 +219,14 @@ def _other(one: Field, face: str | None, used: set[str]) -> str:
     others = ["T", *(f"T{i}" for i in range(1, 99))]
     named = [name for name in (one.name, face) if name is not None and column_spec(name) is not None]
     name = next(n for n in [*named, *others] if n not in used)
-    guessed = name == face != one.name
+    guessed = "of the coil's face? else T_case or T_chamber" if name == face != one.name else None
+    if name not in (*named, "T"):
+        guessed = "a sensor of the coil? else T_case, T_chamber or another name"
     used.add(name)
     spec = column_spec(name)
     assert spec is not None
     if one.unit is not None and is_accepted(name, one.unit):
-        doubt = f"    {_MARK}of the coil's face? else T_case or T_chamber" if guessed else ""
+        doubt = f"    {_MARK}{guessed}" if guessed else ""
         return f"  {name}: {{source: {as_yaml(one.source)}, unit: {as_yaml(one.unit)}}}{doubt}"
     values = one.numbers
     warm = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0

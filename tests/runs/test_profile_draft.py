@@ -357,6 +357,17 @@ def test_the_header_that_numpy_writes_behind_a_mark_names_the_columns(tmp_path, 
     np.testing.assert_allclose(np.column_stack((run.time, run.gyro, run.columns["T_in"])), table)
 
 
+def test_a_set_point_is_no_reading_and_a_second_thermometer_is_a_guess(tmp_path):
+    """A chamber's log: its set temperature was taken for the coil's inner face."""
+    head = "Zeit [s];Feuchte [%];Omega [V];Temp Istwert [°C];Temp Sollwert [°C];Temp Halter [°C]\n"
+    rows = "".join(f"{i};{i % 29},0;{i % 37},5;{20 + i},5;25,0;{19 + i},5\n" for i in range(COUNT))
+    (tmp_path / "log.csv").write_text(head + rows)
+    draft = draft_profile(tmp_path / "log.csv").splitlines()
+    assert next(line for line in draft if "Omega" in line).startswith("  gyro:")
+    assert next(line for line in draft if "Sollwert" in line).startswith("# keep")
+    assert ["GUESS" in line for line in draft if "Istwert" in line or "Halter" in line] == [False, True]
+
+
 def test_a_remark_with_a_date_is_no_header(tmp_path):
     rows = "".join(f"{i} {7 + i % 3}.5 {20 + i} 0 1 2\n" for i in range(COUNT))
     (tmp_path / "log.txt").write_text("% 2014-03-21 17:31:51 by a fitter\n" + rows)
