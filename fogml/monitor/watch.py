@@ -5,74 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from itertools import groupby, product
+from itertools import groupby
 from typing import Literal
 
 import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError, listed
-from fogml.intervals import TAILS
 from fogml.monitor.changes import Chart, Shape, change_chart
-from fogml.monitor.evidence import ChangePrior, flicker_covariance
+from fogml.monitor.evidence import ChangePrior
 from fogml.monitor.record import FIGURES, RunRecord
-from fogml.signals.distributions import student_ppf, students_ppf
-from fogml.signals.restricted import absent_or_not, weighed_models
-
-_RATIOS = np.concatenate(([0.0], 8.0 ** np.arange(-3.0, 4.0)))
-"""Variance of flicker in a factor e of time, or of a walk from run to run, in that of the white part."""
-
-
-def trend_interval(
-    age: FloatArray, values: FloatArray, *, wanders: bool = True
-) -> tuple[float, tuple[float, float]]:
-    """Slope of a line through the values, in their unit per unit of age, and its interval at `LEVEL`.
-
-    Between the runs there may be flicker and a random walk beside white noise, of any size. A few runs hardly
-    tell a trend from a walk, and an average over what they may be would hold too seldom where they do walk.
-    So the interval is that of the profile likelihood, restricted as the line's constants are unknown: every
-    slope that some noise makes as likely as the interval's ends are under noise that is known. There it is
-    Student's t.
-
-    Parameters
-    ----------
-    age
-        Age at each run, not all the same, shape (n,), n over 2.
-    values
-        The figure, shape (n,).
-    wanders
-        Whether it may wander between the runs; without, noise between them is white.
-
-    Returns
-    -------
-    slope, ci90
-        Median over the noises by their likelihoods, either part being as likely there as not; and the
-        interval.
-    """
-    n = len(age)
-    t = (age - age[0]) * ((n - 1) / float(np.ptp(age)))
-    ratios = np.array(list(product(_RATIOS if wanders else _RATIOS[:1], repeat=2)))
-    parts = np.stack((flicker_covariance(t, ChangePrior().longest_wander), np.minimum(t[:, None], t)))
-    before = absent_or_not(ratios)
-    models = weighed_models(
-        np.eye(n) + np.tensordot(ratios, parts, 1),
-        np.column_stack((np.ones(n), age - age.mean())),
-        values - values.mean(),
-        before,
-    )
-    slopes, scales, freedom = models.constants, models.scales, models.freedom
-    median = float(students_ppf(0.5, models.weights, slopes, scales, freedom))
-    with np.errstate(divide="ignore"):
-        likelihood = np.log(models.weights) - before
-    # Student's t at its own quantile is so much less likely than in its middle.
-    allowed = 0.5 * (freedom + 1.0) * np.log1p(student_ppf(TAILS[1], freedom) ** 2 / freedom)
-    left = likelihood - likelihood.max() + allowed
-    reach = np.sqrt(freedom * np.expm1(2.0 * np.maximum(left, 0.0) / (freedom + 1.0))) * scales
-    low, high = (
-        float(end) for end in ((slopes - reach)[left >= 0.0].min(), (slopes + reach)[left >= 0.0].max())
-    )
-    return median, (low, high)
-
+from fogml.monitor.trend import trend_interval
 
 DAY_S = 86400.0
 NEAREST: dict[tuple[str, Shape], tuple[str, ...]] = {

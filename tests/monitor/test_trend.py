@@ -7,12 +7,12 @@ import pytest
 from scipy.stats import linregress
 from scipy.stats import t as student
 
-from fogml.monitor.watch import trend_interval
+from fogml.monitor.trend import trend_interval
 
 AGE = 30.0 * np.arange(14.0)
 
 
-@pytest.mark.parametrize(("white", "walk"), [(1.0, 0.0), (1.0, 1.0), (0.6, 1.0)])
+@pytest.mark.parametrize(("white", "walk"), [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 def test_a_walk_between_runs_is_no_trend(white: float, walk: float) -> None:
     held, wide = [], []
     for seed in range(100):
@@ -22,10 +22,11 @@ def test_a_walk_between_runs_is_no_trend(white: float, walk: float) -> None:
         assert low < middle < high
         held.append(low <= 0.002 <= high)
         wide.append(high - low)
-    # A line for white noise holds four in ten of a walk's, an average over noises 77 and 72 %.
-    assert np.mean(held) > 0.8
+    # A line for white noise holds four in ten of a walk's, an average over noises 77 and 72 %, a likelihood
+    # that is judged as under noise that is known 82 % of a walk alone.
+    assert np.mean(held) > 0.83
     # Least squares for white noise has a width of 3.56 * 0.066 / 14 runs = 0.008: it is told with some loss.
-    assert 0.008 * white < np.median(wide) < (0.03 if not walk else 0.06)
+    assert 0.008 * white <= np.median(wide) < (0.03 if not walk else 0.06)
 
 
 def test_of_a_bias_known_not_to_wander_it_is_the_line_of_least_squares() -> None:
