@@ -34,7 +34,7 @@ _SPELLINGS = {
     "mrad/s": (),
     "arcsec/s": ('"/s', "arcsec/sec", "as/s"),
     "arcsec/h": ('"/h', "arcsec/hr", "arcsec/hour", "as/h"),
-    "degC": ("c", "celsius", "degcelsius", "centigrade"),
+    "degC": ("c", "celsius", "degcelsius", "centigrade", "摄氏度"),
     "degF": ("f", "fahrenheit", "degfahrenheit"),
     "K": ("kelvin", "degk", "degkelvin"),
     "count": ("counts", "lsb", "lsbs", "digit", "digits", "ticks", "adc"),

@@ -58,7 +58,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field]]:
     layout = [f"line_stamp: {as_yaml(stamp)}"] if stamp is not None else []
     layout += [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
     if encoding not in ("utf-8-sig", "utf-8"):
-        layout.append(f"encoding: {encoding}")
+        layout.append(f"encoding: {encoding}    # GUESS: are the names right? else cp1251, shift_jis, ...")
     header = _Header.above(lines, data, width, mark)
     if header is None or header.is_by_place:
         # A name would be of none of its columns, or of several.

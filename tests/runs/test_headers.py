@@ -228,6 +228,10 @@ def test_names_in_chinese(tmp_path):
         (["Time_s", "Gyro_degph", "Tin_degC"], ("time [s]", "gyro [deg/h]", "T_in [degC]")),
         (["t_s", "gyro_degPerHour", "T_C"], ("time [s]", "gyro [deg/h]", "T [degC]")),
         (["t_s", "omega_radps", "T_C"], ("time [s]", "gyro [rad/s]", "T [degC]")),
+        (
+            ["时刻（秒）", "陀螺角速率（度/小时）", "光纤环内温度（摄氏度）", "转台速率（度/秒）"],
+            ("time [s]", "gyro [deg/h]", "T_in [degC]", "rate [deg/s]"),
+        ),
         (["Time (min)", "Gyro (mdps)", "Temp [C]"], ("time [min]", "gyro [mdeg/s]", "T [degC]")),
         (["time [s]", "gyro [dph]", "Temp [C]", "T1"], ("time [s]", "gyro [deg/h]", "Temp [degC]", "T1")),
         (["time [s]", "gyro [dph]", "Temp [C]", "T_out"], ("time [s]", "gyro [deg/h]", "T [degC]", "T_out")),
