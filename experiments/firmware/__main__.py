@@ -215,7 +215,7 @@ def _page(result: dict[str, Any]) -> str:
         f"{result['half_width_90_deg_h']:.3g} deg/h. Clocks begin at Unix time in microseconds; at 1 Hz they "
         "are 32-bit and wrap every 71.6 minutes. Sizes are bytes on a Cortex-M4 (arm-none-eabi-gcc -Os), "
         "instructions those of its code for one sample (-O2), counted in an emulator. Code is a hash of the "
-        "C without its comments and numbers: of what ran, and of what was measured where that is another; "
+        "C without self-test, comments and numbers: of what ran, and of what was measured if it is another; "
         "a longer run by other code stays beside a shorter one.",
         "",
         "| rate | length | format | largest difference at flag 0 [deg/h] | flags that differ | "
