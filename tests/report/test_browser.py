@@ -255,6 +255,17 @@ def test_figures_are_printed_as_wide_as_the_sheet(browser) -> None:
     opened.close()
 
 
+def test_the_block_for_the_firmware_file_is_printed_without_its_button(browser) -> None:
+    block = '<button type="button" class="copy">Copy</button><pre>formula</pre></body>'
+    opened = browser(pages()["train"].replace("</body>", block))
+    opened.on_paper(True)
+    button = opened.tell("document.querySelector('button.copy').getBoundingClientRect().height")
+    letter = opened.tell("parseFloat(getComputedStyle(document.querySelector('pre')).fontSize)")
+    opened.close()
+    # 100 letters of 0.6 of its height on a sheet of 178 mm.
+    assert button == 0 and 100 * 0.6 * letter < 178 / 25.4 * 96
+
+
 @pytest.mark.parametrize("kind", ["fleet", "train", "gap", "index", "sweep"])
 def test_no_word_of_an_axis_lies_on_another_panel_on_paper(browser, kind) -> None:
     """Beside a panel of two columns a title lay over the points of the one to its left."""
