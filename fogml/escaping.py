@@ -7,6 +7,7 @@ are written by their libraries, which quote for themselves.
 
 from __future__ import annotations
 
+import codecs
 import re
 import unicodedata
 
@@ -62,9 +63,37 @@ def cell_text(text: object) -> str:
     return _lines(text)[:_LONGEST_CELL]
 
 
-def terminal_text(text: object) -> str:
-    """Text for a terminal: lines and tabs stay, and nothing in it commands the terminal."""
-    return _lines(text)
+def terminal_text(text: object, encoding: str | None = None) -> str:
+    """Text for a terminal: lines and tabs stay, and nothing in it commands the terminal.
+
+    Parameters
+    ----------
+    text
+        What is shown.
+    encoding
+        The terminal's: signs of figures that it lacks are written in ASCII, letters as question marks.
+
+    Examples
+    --------
+    >>> terminal_text("−7.1 × 10⁻⁵", "ascii")
+    '-7.1 x 10^-5'
+    """
+    encoding = encoding or "utf-8"
+    return _lines(text).encode(encoding, _IN_ASCII).decode(encoding)
+
+
+def _in_ascii(error: UnicodeError) -> tuple[str, int]:
+    """What stands for characters that an encoding lacks, as a handler of its errors."""
+    assert isinstance(error, UnicodeEncodeError)
+    lacking = _RAISED.sub(lambda held: "^" + held[0], error.object[error.start : error.end])
+    return "".join(c if c.isascii() else _PLAIN.get(c, "?") for c in lacking), error.end
+
+
+_RAISED = re.compile("[⁻⁰¹²³⁴-⁹]+")
+_PLAIN = {"…": "...", "→": "->", "±": "+/-", "≤": "<=", "≥": ">=", "√": "sqrt", "✓": "yes", "✗": "no"}
+_PLAIN |= dict(zip("−–⁻×·⁰¹²³⁴⁵⁶⁷⁸⁹", "---x*0123456789", strict=True))
+_IN_ASCII = "fogml-in-ascii"
+codecs.register_error(_IN_ASCII, _in_ascii)
 
 
 def _lines(text: object) -> str:

@@ -14,6 +14,14 @@ from hypothesis import strategies as st
 
 from fogml.escaping import CCode, c_text, cell_text, figure_text, markup, script_data, terminal_text, visible
 
+
+def test_a_figure_keeps_its_sign_and_size_where_an_encoding_lacks_them() -> None:
+    told = {name: terminal_text("ä −0.5 ± 7.1 × 10⁻⁵ m/s² …", name) for name in ("utf-8", "latin-1", "ascii")}
+    assert told["utf-8"] == "ä −0.5 ± 7.1 × 10⁻⁵ m/s² …"
+    assert told["latin-1"] == "ä -0.5 ± 7.1 × 10^-5 m/s² ..."
+    assert told["ascii"] == "? -0.5 +/- 7.1 x 10^-5 m/s^2 ..."
+
+
 NASTY = st.lists(
     st.sampled_from(
         ["*/", "/*", "*", "/", "//", "\\", "??/", "?", '"', "'", "<", ">", "&", "=1+1", "@", "#", "é"]

@@ -87,7 +87,7 @@ class Terminal:
         from rich.console import Console
         from rich.markdown import Markdown
 
-        Console(markup=False).print(Markdown(terminal_text(text)))
+        Console(markup=False).print(Markdown(terminal_text(text, sys.stdout.encoding)))
 
     def result(self, values: Any) -> None:
         """The result on stdout, where JSON is asked for."""
@@ -109,19 +109,20 @@ class Terminal:
         # In a file or a pipe a row is a line.
         bounded = sys.stdout.isatty() or "COLUMNS" in os.environ
         console = Console(highlight=False, markup=False, width=None if bounded else _UNBOUNDED)
-        columns = [[terminal_text(cell) for cell in cells] for cells in zip(header, *rows, strict=True)]
+        lines = [[terminal_text(cell, sys.stdout.encoding) for cell in cells] for cells in (header, *rows)]
+        columns = list(zip(*lines, strict=True))
         # Columns move together before a word breaks.
         widths = _column_widths(columns, console.width - _BETWEEN * len(columns))
         if widths is None:
             widths = _column_widths(columns, console.width - len(columns) - 1)
             table.padding = (0, 0, 0, 0)
-        for number, name in enumerate(header):
+        for number, (name, *_) in enumerate(columns):
             # Where whole words don't fit they break anywhere rather than be cut: a figure is never lost.
             width = widths[number] if widths else None
             right = number > 0 and _holds_figures(columns[number][1:])
             table.add_column(name, justify="right" if right else "left", overflow="fold", width=width)
-        for row in rows:
-            table.add_row(*map(terminal_text, row))
+        for row in lines[1:]:
+            table.add_row(*row)
         console.print(table)
 
     def show(self, table: Table | None, title: str = "", most: int | None = None) -> None:
@@ -160,13 +161,8 @@ def fitted(text: str, stream: TextIO) -> str:
 
     Blocks of lines and commands stay as they are, to be copied.
     """
-    text = terminal_text(text)
-    if "\n" in text or text.startswith("fogml "):
-        return text
-    # A locale without a letter has a question mark for it, in sentences as in tables.
-    encoding = stream.encoding or "utf-8"
-    text = text.encode(encoding, "replace").decode(encoding)
-    if not stream.isatty():
+    text = terminal_text(text, stream.encoding)
+    if "\n" in text or text.startswith("fogml ") or not stream.isatty():
         return text
     width = shutil.get_terminal_size().columns
     below = " " * (len(text) - len(text.lstrip()) + 2)
@@ -223,7 +219,7 @@ class _Lines(Work):
         if self._total and self._done:
             left = spent * (self._total - self._done) / self._done
             text = f"{self._what}: {percent(self._done / self._total, 0)}, about {_clock(left)} left"
-        click.echo(terminal_text(text), err=True)
+        click.echo(terminal_text(text, sys.stderr.encoding), err=True)
 
 
 @contextmanager
