@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -129,6 +130,8 @@ def session_of(data: bytes) -> Any:
     InputError
         If onnxruntime is not installed, or can't run the graph.
     """
+    # It keeps an identity of the machine in the home folder else, and tells its maker of its use.
+    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
     try:
         from onnxruntime import InferenceSession
     except ImportError:

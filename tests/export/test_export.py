@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
+import subprocess
+import sys
 from copy import copy
 from dataclasses import replace
 from functools import cache
@@ -329,6 +332,25 @@ def test_support_vectors_run_in_c(tmp_path):
     report = export_model(model, tmp_path, ExportSettings("c"))
     assert report["model"]["centres"] == len(model.regressor_.regressor_[-1].support_)
     assert report["compared"]["flags_differ"] == 0
+
+
+def test_running_a_graph_leaves_nothing_in_the_home_folder(tmp_path):
+    """onnxruntime keeps an identity of the machine there, for what it tells its maker."""
+    pytest.importorskip("onnxruntime")
+    onnx = pytest.importorskip("onnx")
+    held = onnx.helper.make_tensor_value_info("x", onnx.TensorProto.FLOAT, [1])
+    told = onnx.helper.make_tensor_value_info("y", onnx.TensorProto.FLOAT, [1])
+    graph = onnx.helper.make_graph([onnx.helper.make_node("Identity", ["x"], ["y"])], "g", [held], [told])
+    opset = onnx.helper.make_opsetid("", 17)
+    onnx.save(onnx.helper.make_model(graph, opset_imports=[opset], ir_version=8), tmp_path / "g.onnx")
+    (tmp_path / "home").mkdir()
+    code = (
+        "import sys; from fogml.export.onnx_graph import session_of as of; of(open(sys.argv[1], 'rb').read())"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "ORT_DISABLE_TELEMETRY"}
+    environment |= {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": ""}
+    subprocess.run([sys.executable, "-c", code, tmp_path / "g.onnx"], check=True, env=environment)
+    assert not list((tmp_path / "home").rglob("*"))
 
 
 @pytest.mark.parametrize(
