@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 
 LONGEST_QUOTED = 60
@@ -65,8 +65,16 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """``did you mean 'x'? `` where known names look like this one or hold it, else nothing."""
     known = list(known)
     near = get_close_matches(name, known, n=most, cutoff=0.6 if most == 1 else 0.5)
-    near += [one for one in known if name and name in one and one not in near][: most - len(near)]
+    near += [one for one in known if len(name) > 2 and name in one and one not in near][: most - len(near)]
     return f"did you mean {' or '.join(repr(one) for one in near)}? " if near else ""
+
+
+def did_you_mean_of(word: str, told: Mapping[str, str]) -> str:
+    """``did you mean 'x'? `` of names and what each is for: nearly the word, else told by it or like it."""
+    if len(word) < 3 or get_close_matches(word, told, n=1, cutoff=0.8):
+        return did_you_mean(word, told)
+    held = [name for name, text in told.items() if re.search(rf"\b{re.escape(word)}", text, re.IGNORECASE)]
+    return f"did you mean {' or '.join(map(repr, held[:3]))}? " if held else did_you_mean(word, told)
 
 
 def known_are(name: str, known: Iterable[str], what: str = "known") -> str:

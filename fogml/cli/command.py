@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import UnionType
@@ -16,7 +17,7 @@ from fogml.cli.each_axis import do_job
 from fogml.cli.given import HELP_NAMES, Given, HelpContext
 from fogml.cli.settings import Settings, given_settings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError, did_you_mean, printable, quoted
+from fogml.errors import InputError, did_you_mean_of, printable, quoted
 from fogml.json_files import json_text
 
 
@@ -121,7 +122,13 @@ def usage_words(error: click.UsageError) -> str:
     """What click complains of, as fogml tells it."""
     text = error.format_message().rstrip(".")
     if isinstance(error, click.NoSuchOption):
-        near = did_you_mean(error.option_name, error.possibilities or (), most=2)
+        told = {
+            name.removeprefix("--"): getattr(option, "help", None) or ""
+            for option in (error.ctx.command.params if error.ctx else ())
+            for name in (*option.opts, *option.secondary_opts)
+            if name.startswith("--")
+        }
+        near = re.sub(r"'([\w-]+)'", r"'--\1'", did_you_mean_of(error.option_name.lstrip("-"), told))
         text = f"no such option '{error.option_name}'; {near}".rstrip("; ")
     return f"{text[:1].lower()}{text[1:]}"
 

@@ -16,7 +16,7 @@ import click
 
 from fogml import __version__
 from fogml.cli.given import HELP_NAMES, HelpContext, load
-from fogml.errors import FogmlError, did_you_mean, printable
+from fogml.errors import FogmlError, did_you_mean_of, printable
 from fogml.locks import REMEDIES
 from fogml.processes import end_as_interrupted, heed_interrupt, quiet_libraries
 
@@ -144,7 +144,8 @@ class Group(click.Group):
         if args and not args[0].startswith("-") and args[0] not in self.known:
             groups = [name for name, (place, _) in self.known.items() if place.endswith(":COMMANDS")]
             within = [f"{name} {args[0]}" for name in groups if args[0] in load(self.known[name][0])]
-            near = f"did you mean '{within[0]}'?" if within else did_you_mean(args[0], self.known).rstrip()
+            texts = {name: text for name, (_, text) in self.known.items()}
+            near = f"did you mean '{within[0]}'?" if within else did_you_mean_of(args[0], texts).rstrip()
             hint = near or f"commands are {', '.join(self.known)}"
             fail(f"no such command '{args[0]}'; {hint}")
         return super().resolve_command(ctx, args)

@@ -347,3 +347,20 @@ def test_the_program_runs():
 
 def test_a_command_of_a_group_is_named_where_the_group_is_left_out():
     assert "no such command 'acceptance'; did you mean 'lab acceptance'?" in run_program("acceptance").stderr
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        (("allan",), "'noise'"),
+        (("apply",), "'compensate'"),
+        (("trian",), "'train'"),
+        (("diagnose", "--holdout"), "'--held-out'"),
+    ],
+)
+def test_what_a_word_may_mean_is_told_by_spelling_or_by_what_is_said_of_it(given, meant):
+    assert f"; did you mean {meant}?" in run_program(*given).stderr
+
+
+def test_no_option_is_offered_that_only_shares_its_dashes():
+    assert "did you mean" not in run_program("diagnose", "--test").stderr
