@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
 from fogml.models.rbf.evaluate import basis_functions, evaluate_network
 from fogml.models.rbf.network import Network, solve_network
 from fogml.models.rbf.rates import Edge
@@ -125,6 +126,17 @@ def test_beyond_its_edge_a_network_is_linear_and_has_no_step_or_kink() -> None:
     before, after = (values[1] - values[0]) / 1e-3, (values[2] - values[1]) / 1e-3
     assert after == pytest.approx(before, abs=5e-3)
     assert values[3] - values[1] == pytest.approx(1e3 * (values[2] - values[1]), rel=1e-6)
+
+
+def test_a_stored_network_goes_on_beyond_its_edge_as_it_did() -> None:
+    net, rows = network(edge()), 4.0 * np.random.default_rng(5).normal(size=(300, INPUTS))
+    kept = INPUTS, [0, 2], [1, 2]
+    again = Network.from_arrays(*kept, net.arrays("float64"), "float64")
+    np.testing.assert_array_equal(again(rows), net(rows))
+    assert not np.array_equal(again(rows), network()(rows))
+    for wrong in ([[0.5, -2.0], [1.0, 2.0]], [[-1.0, -2.0], [1.0, -0.5]]):
+        with pytest.raises(InputError, match="'edge' is not a range about 0"):
+            Network.from_arrays(*kept, {**net.arrays("float64"), "edge": np.float32(wrong)}, "float64")
 
 
 def test_rates_are_drawn_in_together_and_into_range() -> None:
