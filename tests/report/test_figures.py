@@ -12,9 +12,10 @@ import plotly.graph_objects as go
 import pytest
 from scipy.stats import chi2
 
+from fogml.gap.result import HowFar
 from fogml.pictures import Curve, line_figure
 from fogml.report.compare_page import residuals_in_time, rms_bars
-from fogml.report.figures_gap import _parted
+from fogml.report.figures_gap import _parted, how_far_strip
 from fogml.report.figures_gap_evidence import variance_ratios
 from fogml.report.figures_judgement import (
     DRAWN_POINTS,
@@ -26,7 +27,7 @@ from fogml.report.figures_judgement import (
 from fogml.report.figures_noise import term_deviation
 from fogml.report.index_page import loop_between, loops
 from fogml.report.inspect_page import temperature_rates
-from fogml.report.page import Drawing
+from fogml.report.page import Drawing, _Drawings
 from fogml.report.plan_page import programme_drawing
 from fogml.report.style import segments_of, shade
 from fogml.report.sweep_page import pareto_front
@@ -162,6 +163,32 @@ def test_a_thousand_regimes_stay_quick() -> None:
     before = len(figure.layout.shapes)
     shade(figure, [("soak" if i % 2 else "ramp_up", float(i), float(i + 1)) for i in range(1000)])
     assert len(figure.layout.shapes) - before <= 200
+
+
+def test_a_regime_too_brief_to_be_seen_has_no_band_wherever_it_is() -> None:
+    figure = go.Figure()
+    named = shade(figure, [("soak", 0.0, 50.0), ("ramp_up", 50.0, 50.001), ("ramp_down", 50.001, 100.0)])
+    assert len(figure.layout.shapes) == 2 and "ramp_up" not in " ".join(named)
+
+
+def test_a_run_of_slow_samples_is_averaged_over_two_at_least() -> None:
+    time = 50.0 * np.arange(300)
+    run = Run.from_columns(time=time, gyro=0.0 * time, T=0.5 * time / 60.0)
+    rate_time, rate, _ = temperature_rates(run)["T"]
+    assert rate == pytest.approx(0.5) and np.diff(rate_time) == pytest.approx(100.0)
+
+
+def test_what_closes_has_a_line_through_its_three_figures_on_each_run() -> None:
+    items = [HowFar(run, 100.0, 0.5, 0.3, 0.01, FLOOR, 0.9, None) for run in ("b.csv", "c.csv")]
+    for trace in how_far_strip(items, named=True).figure.data:
+        assert len(trace.x) == len(trace.y)
+
+
+def test_figures_of_a_page_are_numbered_one_by_one() -> None:
+    figure = re.compile(r'id="figure-(\d+)"')
+    drawings = _Drawings()
+    told = [drawings(drift_in_time(judged_run())) for _ in range(3)]
+    assert [figure.findall(str(one)) for one in told] == [["1"], ["2"], ["3"]]
 
 
 def test_alternative_texts_hold_the_figures() -> None:

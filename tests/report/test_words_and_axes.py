@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from fogml import numerals as words
 from fogml.pictures import braille, ticks
 from fogml.report.blind_tables import open_set_plot, spanned
+from fogml.report.monitor_words import _days
 from fogml.report.page import _breakable
 from fogml.report.style import log_axis, rounded_up, time_unit
 from fogml.report.tables import Table, coefficients_table
@@ -170,3 +171,11 @@ def test_a_curve_of_no_method_is_not_drawn() -> None:
     drawing = open_set_plot({"diagnosis": flat, "bic": bent}, {"bic": 0.85})
     assert drawing is not None and [trace.name for trace in drawing.figure.data] == ["chance", "bic (0.850)"]
     assert spanned("0.8-0.9") == "0.8–0.9" and spanned("same-twin") == "same-twin"
+
+
+@pytest.mark.parametrize("days", [0.2, 1.0, 45.0, 59.0, 61.0, 200.0, 729.0, 731.0, 3652.5, 20_000.0])
+def test_a_long_time_is_told_to_half_a_unit(days):
+    count, unit = _days(days).split()
+    each = {"day": 1.0, "days": 1.0, "month": 30.44, "months": 30.44, "year": 365.25, "years": 365.25}[unit]
+    assert abs(int(count) * each - days) <= max(0.5 * each, 1.0 - days)
+    assert (count == "1") is not unit.endswith("s")
