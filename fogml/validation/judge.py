@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -125,11 +126,13 @@ def judgement_of(
     constant = (0.0, 0.0) if earth_known else training_means(train)
     if noise is not None:
         check_noise_run(noise)
-    judged_train = tuple(judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise) for e in train)
-    judged_test = tuple(
-        judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise, _seen(e.run, train_runs, model))
-        for e in test
-    )
+
+    def judged(one: RunErrors, seen: tuple[Finding, ...] = ()) -> RunJudgement:
+        found = judge_run(one, averaging_s, constant, earth_known, turn_on_band, noise, seen)
+        return replace(found, noise=_noise(one.run))
+
+    judged_train = tuple(judged(e) for e in train)
+    judged_test = tuple(judged(e, _seen(e.run, train_runs, model)) for e in test)
     return Judgement(
         model=model.describe(),
         train=judged_train,
@@ -211,7 +214,7 @@ def judge_run(
     noise: Run | None = None,
     seen: tuple[Finding, ...] = (),
 ) -> RunJudgement:
-    """The judgement of one run from a model's errors on it.
+    """The judgement of one run from a model's errors on it, without Allan terms, which take most of the time.
 
     Parameters
     ----------
@@ -259,7 +262,6 @@ def judge_run(
         rows_left_out=int((~used).sum()),
         bias_reference="earth rate" if earth_known else "training mean",
         series=_series(errors, metrics, before, after),
-        noise=_noise(run),
         findings=findings,
         notes=(*((run.facts.notes,) if run.facts.notes else ()), *errors.notes, *metrics.notes),
         power_on_known=run.facts.powered_on is not None,

@@ -11,6 +11,7 @@ from fogml.lab.rate_json import rate_json
 from fogml.report.acceptance_page import acceptance_page
 from fogml.runs.checks import check_run
 from fogml.runs.facts import Facts
+from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
 from tests.lab.units import EARTH, row
 
@@ -205,6 +206,21 @@ def test_runs_that_do_not_state_their_attitude_bring_no_earth_rate_into_biases(l
     alike = [Run.from_columns(one.name, Facts(unit=UP.unit, axis=UP.axis), **one.columns) for one in runs]
     told = row(acceptance_json(alike), "bias_repeatability")
     assert told["before"] == pytest.approx(np.std(biases, ddof=1), abs=1e-4)
+
+
+def test_noise_terms_are_those_of_the_static_run_alone(cycle, monkeypatch):
+    """A fit for each run, of which nothing is told, took three quarters of the time."""
+    fitted = []
+
+    def told(run):
+        fitted.append(run.name)
+        return noise_report(run)
+
+    for place in ("fogml.validation.judge", "fogml.lab.acceptance_figures"):
+        monkeypatch.setattr(f"{place}.noise_report", told)
+    still = table_run("still", [0.0], [0.0], stay=2000, facts=UP)
+    assert row(acceptance_json([cycle, still]), "angle_random_walk")["of"] == "still"
+    assert set(fitted) == {"still"}
 
 
 def test_an_output_at_the_ends_of_its_range_is_not_accepted(cycle, limits):
