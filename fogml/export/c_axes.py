@@ -17,6 +17,7 @@ from fogml.export.documentation import DOCUMENTATION_FILE
 from fogml.export.export import export_model
 from fogml.export.losses import runs_of_each
 from fogml.export.plan import Plan
+from fogml.export.self_test import sum_of_reals
 from fogml.export.settings import SCHEMA, ExportSettings, report_tail
 from fogml.export.tables import by_axis, read_matrix
 from fogml.models.base import DriftModel
@@ -150,6 +151,7 @@ def axes_source(
     kind = dtype or "float32"
     context = {
         "matrix": [", ".join(literal(value, kind) for value in row) for row in matrix or ()],
+        "matrix_sum": 0 if matrix is None else sum_of_reals(matrix, kind),
         "axes": [code.axis for code in codes],
         "codes": [CCode(code.header) for code in codes],
         "sources": [CCode(code.source) for code in codes],

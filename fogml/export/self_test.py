@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fogml.escaping import CCode
 from fogml.export.layout import Layout
@@ -163,6 +164,15 @@ def numbers_of(lines: Iterable[str]) -> dict[str, list[Any]]:
         elif number := _NUMBER.match(line):
             found["real" if _REAL.search(number[2]) else "whole"].append(CCode(number[1]))
     return found
+
+
+def sum_of_reals(values: ArrayLike, dtype: str) -> int:
+    """What the C makes of numbers in float64 or float32, one after another."""
+    total, bits = 2166136261, np.asarray(values, dtype).view(f"u{np.dtype(dtype).itemsize}")
+    for number in bits.ravel().tolist():
+        for half in (number & 0xFFFFFFFF, number >> 32):
+            total = (total ^ half) * 16777619 & 0xFFFFFFFF
+    return total
 
 
 def _interval(plan: Plan, windows: Layout) -> tuple[float, int]:

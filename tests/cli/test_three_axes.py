@@ -135,6 +135,11 @@ def test_one_c_file_gives_what_compensate_gives(home, trained, invoke_json, invo
     subprocess.run(["gcc", *words, out / "fogml_axes.c", "-o", library], check=True)
     code = ctypes.CDLL(str(library))
     assert code.fogml_axes_self_test() == 0
+    text = (out / "fogml_axes.c").read_text()
+    (tmp_path / "changed.c").write_text(text.replace("{ 0.0, 1.0, -0.002 }", "{ 0.0, 1.0, -0.0021 }", 1))
+    changed = tmp_path / "changed.so"
+    subprocess.run(["gcc", *words, "-I", out, tmp_path / "changed.c", "-o", changed], check=True)
+    assert ctypes.CDLL(str(changed)).fogml_axes_self_test() != 0
     state = ctypes.create_string_buffer(3 * max(code[f"fogml_{axis}_state_bytes"]() for axis in AXES) + 64)
     code.fogml_axes_init(state)
     runs = [read_run(home / "b.csv", axis=axis) for axis in AXES]
