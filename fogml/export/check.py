@@ -47,7 +47,7 @@ class Difference:
     points, samples
         Points in the box and samples of a history that were compared.
     good
-        Those of the history with flag 0.
+        Those of the history with flag 0; of a graph from windows, those in the trained box.
     flags
         Samples of the history whose flag differs.
     scale_ppm
@@ -152,13 +152,18 @@ def _over_history(
     """How far C is from the plan [deg/h], flags of both, and those of the box alone, each (n,)."""
     fixed, atoms = source.numbers["fixed"], past.atoms(plan)
     expected, flags = plan.compensated(atoms, past.gyro)
-    boxed = replace(plan, limits=replace(plan.limits, slices=None)).compensated(atoms, past.gyro)[1]
+    boxed = _boxed(plan).compensated(atoms, past.gyro)[1]
     if fixed is None:
         out, told = program.steps(past.time, past.temperatures, past.gyro)
         return np.abs(out.astype(np.float64) - expected), flags, told, boxed
     temperatures = np.round(past.temperatures / fixed["temperature_value"])
     out, told = program.steps(past.time, temperatures, np.round(past.gyro / fixed["gyro_value"]))
     return np.abs(out * fixed["compensated_value"] - expected), flags, told, boxed
+
+
+def _boxed(plan: Plan) -> Plan:
+    """The plan, which flags what lies outside of the trained box alone."""
+    return replace(plan, limits=replace(plan.limits, slices=None))
 
 
 def _reading_steps(plan: Plan, source: CSource) -> FloatArray:
@@ -232,7 +237,7 @@ def pipeline_difference(
     time = past.time[0] + plan.sample_s * np.arange(count)
     temperatures = np.column_stack([np.interp(time, past.time, path) for path in past.temperatures.T])
     whole = type(past)(time, temperatures, np.full(count, past.gyro[0]))
-    expected, flags = plan.compensated(whole.atoms(plan), whole.gyro)
+    expected, flags = _boxed(plan).compensated(whole.atoms(plan), whole.gyro)
     ends = np.linspace(length, count - 1, min(512, max(1, count - length))).astype(int)
     windows = np.stack([temperatures[end - length + 1 : end + 1] for end in ends])
     off = np.abs(whole.gyro[ends] - value(windows, whole.gyro[ends]) - expected[ends])

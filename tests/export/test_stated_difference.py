@@ -11,7 +11,7 @@ import pytest
 
 from fogml.export.c_program import CProgram
 from fogml.export.c_source import c_source
-from fogml.export.check import c_difference
+from fogml.export.check import c_difference, pipeline_difference
 from fogml.export.plan import Plan
 from fogml.models.names import make_model
 from fogml.runs.run import Run
@@ -70,3 +70,14 @@ def test_a_recorded_runs_own_thermometer_is_in_it(tmp_path):
     program = CProgram(source, tmp_path, flags=QUICK)
     alone, beside = (c_difference(plan, source, program, 0, runs).inside for runs in ((), (run,)))
     assert alone < 0.9 * found(plan, "float64", tmp_path, run, model) < beside
+
+
+def test_a_graph_from_windows_is_compared_where_slices_leave_no_history(tmp_path):
+    plan = Plan.of(make_model("polynomial", features="T_in, dT_in").fit(start(2.0)))
+    free = replace(plan, limits=replace(plan.limits, slices=None))
+
+    def nothing(windows, gyro):
+        return 0.0 * gyro
+
+    told = [pipeline_difference(one, nothing, 65, 0) for one in (plan, free)]
+    assert told[0] == told[1] and told[0].good > 100
