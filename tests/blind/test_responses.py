@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fogml.blind.first.effects.electrical import Crosstalk
+from fogml.blind.first.effects.electrical import Crosstalk, PolarisationChirped
 from fogml.blind.first.effects.invented import HotBursts
 from fogml.blind.first.effects.turning import HuntingServo
 from fogml.blind.first.programme import _chamber_path
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Additive, Form
 from fogml.blind.frame.noise import StateNoise
+from fogml.blind.frame.record import EARTH_DEG_H
 from fogml.blind.plan import REALITIES, reality
+from fogml.blind.second.effects.lasting import _clusters
 from fogml.blind.second.reality import _field, humidity_of
 from fogml.twin.registry import effects
 
@@ -59,6 +61,35 @@ def test_cross_talk_grows_with_the_supply_times_its_ratio() -> None:
     assert one - none == pytest.approx(2.0 * (supply - 12.0)) and three - none == pytest.approx(
         3.0 * (one - none)
     )
+
+
+def test_a_beat_repeats_after_its_period_and_sooner_the_more_it_drifts() -> None:
+    degrees = np.linspace(25.0, 65.0, len(TIME))
+    shown = world(nodes={"T_electronics": degrees})
+    even, drifting = (
+        PolarisationChirped().response(
+            shown, {"period": 8.0, "phase": 30.0, "drift": drift}, np.random.default_rng(1)
+        )
+        for drift in (0.0, 2e-4)
+    )
+    assert np.interp(degrees[0] + 8.0, degrees, even) == pytest.approx(even[0], abs=1e-3) == 0.5
+    rises = [np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0)) for x in (even, drifting)]
+    assert np.diff(degrees[rises[0]]) == pytest.approx(8.0, abs=0.02) and np.all(rises[1] < rises[0])
+
+
+def test_the_earth_turns_once_in_a_sidereal_day() -> None:
+    assert pytest.approx(3600.0 * 360.0 / 86_164.0905, rel=1e-6) == EARTH_DEG_H
+
+
+def test_loops_of_grains_scatter_about_their_typical_width() -> None:
+    """Over 2000 draws of up to nine grains each, by its logarithm, beside a lean of 2 % a degree."""
+    spreads = []
+    for seed in range(2000):
+        shape = _clusters(np.random.default_rng(seed))
+        widths = np.log([shape[f"half_width_{k}"] for k in range(int(shape["grains"]))])
+        spreads.append(np.var(widths, ddof=1))
+    # Leans of up to 0.02 over centres from -30 to 60 scatter by 0.3 on the whole.
+    assert np.mean(spreads) == pytest.approx(0.4**2 + 0.02**2 / 3.0 * 90.0**2 / 12.0, rel=0.1)
 
 
 def test_a_hunting_servo_swings_in_its_period() -> None:
