@@ -9,11 +9,16 @@ import signal
 import subprocess
 import sys
 import time
+from inspect import Parameter, signature
 from pathlib import Path
 
 import pytest
 
+from fogml.cli.model_commands import CompareSettings, TrainSettings
+from fogml.cli.twin_commands import DiagnoseSettings
+from fogml.gap.diagnosis import diagnose
 from fogml.outputs import whole_file, whole_folder
+from fogml.validation.judge import judge
 from tests.cli.conftest import csv_text
 
 PROGRAM = [sys.executable, "-c", "from fogml.cli.main import main; main()"]
@@ -150,3 +155,13 @@ def test_a_locale_of_ascii(tmp_path):
     assert found.returncode == 0, found.stderr
     assert found.stdout.isascii() and found.stderr.isascii()
     json.loads((tmp_path / "out" / "noise.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("settings", "function"), [(DiagnoseSettings, diagnose), (TrainSettings, judge), (CompareSettings, judge)]
+)
+def test_a_command_takes_the_defaults_of_its_function(settings, function):
+    stated = {name: one.default or None for name, one in settings.model_fields.items()}
+    given = {name: one.default or None for name, one in signature(function).parameters.items()}
+    shared = {name for name in stated.keys() & given.keys() if given[name] is not Parameter.empty}
+    assert len(shared) > 3 and {n: stated[n] for n in shared} == {n: given[n] for n in shared}
