@@ -29,7 +29,7 @@ from fogml.runs.logger_lines import (
 )
 from fogml.runs.other_rate import is_of_another_rate
 from fogml.runs.profile_parts import TextLayout
-from fogml.runs.stamps import StampClock, Stamps, stamps_of
+from fogml.runs.stamps import PARTS, StampClock, Stamps, stamps_of, stamps_of_parts
 from fogml.signals import large
 
 _SIGNATURE_LINES = 20
@@ -297,8 +297,8 @@ class _Reader:
 
     def _reject(self, what: str, rows: BoolArray) -> None:
         """Count rejected rows; `rows` (n,) marks them among the data rows of a part."""
-        before = self.rejected.get(what)
-        count = int(np.count_nonzero(rows)) + (before.count if before else 0)
+        before, count = self.rejected.get(what), int(np.count_nonzero(rows))
+        count += before.count if before else 0
         row = before.row if before else self.rows_before + int(np.argmax(rows)) + 1
         message = f"{counted(count, 'row')} {what} left out"
         self.rejected[what] = Finding("rejected_rows", message, row=row, count=count)
@@ -307,15 +307,15 @@ class _Reader:
         """Times since the first stamp [s], NaN where a text is none; nothing without a clock of stamps."""
         import pyarrow as pa
 
-        places = self.profile.stamps
-        if not places:
+        if not (places := self.profile.stamps):
             return None
-        columns = [texts[place] for place in places]
+        columns = [texts[place].tolist() for place in places]
+        columns = [stamps_of_parts(columns)] if len(columns) == PARTS else columns
         if self.clock is None:
-            stamps = stamps_of([(i, column[:1000].tolist()) for i, column in enumerate(columns)])
+            stamps = stamps_of([(i, column[:1000]) for i, column in enumerate(columns)])
             if stamps is None:
-                first = " ".join(str(text) for column in columns for text in column[:1])
-                named = listed([quoted(str(place)) for place in places])
+                first = " ".join(str(texts[place][0]) for place in places if len(texts[place]))
+                named = listed([quoted(str(p)) for p in places])
                 what = "date or time of day" if len(places) == 1 else "date in one, time of day in the other"
                 raise InputError(
                     f"{self.file}, column {named}: {quoted(first)} in the first row is no {what}; {self.hint}"

@@ -19,7 +19,7 @@ from fogml.runs.opening import opened
 from fogml.runs.raw_table import vector_fault
 from fogml.runs.reader_process import stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS
-from fogml.runs.stamps import stamp_form
+from fogml.runs.stamps import PARTS, stamp_form, stamps_of_parts
 
 _TIME = re.compile(r"time|stamp|clock|zeit|epoch|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
 _COUNT = re.compile(r"sample|index|count|packet|seq|row|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
@@ -143,6 +143,10 @@ def _is_of_a_run(one: Field) -> bool:
 def _clock(left: list[Field]) -> list[str]:
     """The clock's line: stamps, else a column that only grows and is named as one."""
     stamped = [(f, form.kind) for f in left if f.first and (form := stamp_form([f.first[0].strip()]))]
+    if not stamped and (of_a_date := _parts_of_a_clock(left)):
+        left[:] = [f for f in left if all(f is not one for one in of_a_date)]
+        sources = [as_yaml(one.source) for one in of_a_date]
+        return [f"  time: {{source: [{', '.join(sources)}], unit: stamp}}"]
     # What stands still is no time of day.
     stamped.sort(key=lambda one: len(set(one[0].first)) == 1)
     if stamped:
@@ -183,6 +187,16 @@ def _clock(left: list[Field]) -> list[str]:
         lasts = duration(apart * _UNITS[unit])
         step = f"steps of {apart:.6g}{f': {lasts}{ms}' if ms or unit != 's' else ''}; "
     return [f"  time: {{source: {as_yaml(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"]
+
+
+def _parts_of_a_clock(fields: Sequence[Field]) -> Sequence[Field]:
+    """Six neighbouring fields that are year, month, day, hour, minute and second in every row, else none."""
+    for start in range(len(fields) - PARTS + 1):
+        found = fields[start : start + PARTS]
+        texts = [[cell.strip(' "') for cell in one.first] for one in found]
+        if texts[0] and all(stamps_of_parts(texts)):
+            return found
+    return ()
 
 
 def _grows(one: Field) -> bool:

@@ -38,8 +38,8 @@ class ImportColumn(Strict):
 
     `source` is the column's name in the file's header, or its position where there is none; of a container
     ``GROUP/FIELD``, or the field alone. The unit ``stamp`` of ``time`` says dates and times of day, in one
-    column or a list of two. `missing` lists values that stand for none: a temperature is interpolated there,
-    other rows are left out; both are counted.
+    column, a list of two, or one of six: year, month, day, hour, minute, second. `missing` lists values that
+    stand for none: a temperature is interpolated there, other rows are left out; both are counted.
     """
 
     source: Source | list[Source] | None = None

@@ -38,6 +38,8 @@ _FORMS = {
     "duration": r"^\s*(?P<N>\d+(?:[.,]\d+)?) (?P<U>sec|min|hr|days?)\s*$",
     "fraction of a second": r"^\s*(?P<F>\d{1,9})\s*$",
 }
+PARTS = 6
+"""Columns of a clock that has one for each of year, month, day, hour, minute and second."""
 FRACTION = "fraction of a second"
 """Digits in a field of their own, where a comma before them separates fields too."""
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
@@ -217,6 +219,30 @@ def stamps_of(columns: Sequence[tuple[int, Sequence[str]]]) -> Stamps | None:
         first += int(found[0])
     shown = [re.match(_FORMS[form.kind], texts[0]) for (_, form), (_, texts) in zip(known, columns)]
     return Stamps(known, first, any(match is not None and match.groupdict().get("z") for match in shown))
+
+
+def stamps_of_parts(parts: Sequence[Sequence[str]]) -> list[str]:
+    """Dates and times of day from texts of year, month, day, hour, minute and second, n each.
+
+    Empty where they are none, as of a month 13 or a part of a second before the last.
+    """
+    numbers = np.array([[_number(text) for text in column] for column in parts])
+    year, month, day, hour, minute, second = numbers
+    low, high = np.array([[1900, 1, 1, 0, 0, 0], [2200, 12, 31, 23, 59, 60]], dtype=np.float64)[:, :, None]
+    known = np.all((numbers >= low) & (numbers <= high), axis=0) & np.all(numbers[:5] % 1.0 == 0.0, axis=0)
+    months = np.where(known, (year - 1970.0) * 12.0 + month - 1.0, 0.0).astype("datetime64[M]")
+    days = months.astype("datetime64[D]") + np.where(known, day - 1.0, 0.0).astype(np.int64)
+    known &= days.astype("datetime64[M]") == months
+    of_day = np.where(known, np.rint(((hour * 60.0 + minute) * 60.0 + second) * _NS), 0.0).astype(np.int64)
+    moments = days.astype("datetime64[ns]") + of_day.astype("timedelta64[ns]")
+    return [str(text) if is_one else "" for text, is_one in zip(np.datetime_as_string(moments), known)]
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
 
 
 def _whole(texts: Any) -> IntArray:

@@ -357,6 +357,23 @@ def test_the_header_that_numpy_writes_behind_a_mark_names_the_columns(tmp_path, 
     np.testing.assert_allclose(np.column_stack((run.time, run.gyro, run.columns["T_in"])), table)
 
 
+@pytest.mark.parametrize("form", ["{:g}", "{:.9e}"])
+def test_a_clock_in_six_columns_is_that_of_its_dates(tmp_path, form):
+    """As MATLAB's clock() gives it, with names or as `save -ascii` writes it, over a month's end."""
+    begin = np.datetime64("2028-02-28T23:59:45.250")
+    moments = begin + (np.arange(COUNT) * 43_200_500).astype("timedelta64[ms]")
+    dates = [moment.item() for moment in moments]
+    cells = [(d.year, d.month, d.day, d.hour, d.minute, d.second + d.microsecond / 1e6) for d in dates]
+    rows = [[*cell, 9.5 + i % 31, 20.0 + 0.1 * i] for i, cell in enumerate(cells)]
+    text = "".join(",".join(form.format(value) for value in row) + "\n" for row in rows)
+    (tmp_path / "log.csv").write_text(("" if "e" in form else "Y,M,D,h,m,s,gyro_dph,T_degC\n") + text)
+    draft = draft_profile(tmp_path / "log.csv")
+    (tmp_path / "profile.yaml").write_text(draft.replace("unit: deg/s", "unit: deg/h"))
+    (run,) = import_recording(tmp_path / "log.csv", tmp_path / "profile.yaml")
+    np.testing.assert_allclose(run.time, 43200.5 * np.arange(COUNT), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(run.gyro, 9.5 + np.arange(COUNT) % 31)
+
+
 def test_a_set_point_is_no_reading_and_a_second_thermometer_is_a_guess(tmp_path):
     """A chamber's log: its set temperature was taken for the coil's inner face."""
     head = "Zeit [s];Feuchte [%];Omega [V];Temp Istwert [°C];Temp Sollwert [°C];Temp Halter [°C]\n"
