@@ -16,7 +16,7 @@ from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, listed
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
-from fogml.runs.findings import DEAD, FIRST_OF_ALL, Finding
+from fogml.runs.findings import DEAD, FIRST_OF_ALL, Finding, beside_drift, first_of_all
 from fogml.runs.names import renamed
 from fogml.runs.run import Run
 
@@ -164,7 +164,8 @@ def open_noise(
     if path is None:
         return None
     run = open_run(path, repair=repair, axis=axis)
-    note_findings([run], terminal)
+    for finding in first_of_all(beside_drift(run.findings)):
+        terminal.note(f"{run.name}: {finding.message}")
     for fact in ("unit", "axis"):
         own = getattr(run.facts, fact)
         others = sorted({str(stated) for one in of if (stated := getattr(one.facts, fact))})

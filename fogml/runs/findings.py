@@ -55,9 +55,14 @@ def standstill(findings: Iterable[Finding]) -> Finding | None:
     return next((one for one in findings if one.code == DEAD or (one.code, one.column) == stuck), None)
 
 
+def beside_drift(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings on a run that no drift model is made of, such as a static one."""
+    return [one for one in findings if one.code not in OF_DRIFT]
+
+
 def of_any_use(run: str, findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """What a laboratory's procedure tells of a run's findings, with the run's name, JSON-ready."""
-    return [{"run": run, **one.as_dict()} for one in findings if one.code not in OF_DRIFT]
+    return [{"run": run, **one.as_dict()} for one in beside_drift(findings)]
 
 
 def saturated(findings: Iterable[Finding]) -> tuple[str, int] | None:

@@ -13,6 +13,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
 from fogml.numerals import percent, short
+from fogml.runs.findings import beside_drift
 from fogml.runs.noise_series import (
     LOST,
     NoiseSeries,
@@ -144,7 +145,7 @@ def noise_report(
         "minimum": {"adev": terms.minimum_adev, "tau_s": float(f"{terms.minimum_tau_s:.9g}")},
         "runs": [{"run": one.run.name, "terms": _terms(told, unread)} for one, told in zip(series, alone)],
         "warnings": warnings,
-        "findings": [finding.as_dict() for one in runs for finding in one.findings],
+        "findings": [finding.as_dict() for one in runs for finding in beside_drift(one.findings)],
         "notes": [*notes, *words_of(terms, first, runs), *(warning["message"] for warning in warnings)],
     }
 

@@ -72,6 +72,19 @@ def test_a_faulty_noise_run_is_repaired_as_the_others_are(invoke, invoke_json, r
     assert invoke_json(*arguments, "--repair")["test"][0]["floor_source"].endswith("noise.csv")
 
 
+def test_a_static_run_is_not_told_that_its_temperature_stands_still(invoke, run_files, tmp_path):
+    train, test = run_files
+    noise = tmp_path / "noise.csv"
+    rows = [line.split(",") for line in csv_text(7).splitlines()]
+    noise.write_text("\n".join([",".join(rows[0]), *(f"{time},{gyro},25.0" for time, gyro, _ in rows[1:])]))
+    assert "the temperature spans" in invoke("inspect", noise).stdout
+    told = [
+        invoke("noise", noise),
+        invoke("train", train, "--test", test, *QUICK, "--noise", noise, "-o", tmp_path / "out"),
+    ]
+    assert not any("the temperature spans" in one.stdout + one.stderr for one in told)
+
+
 @pytest.mark.parametrize("fact", ["unit", "axis"])
 def test_a_noise_run_of_another_unit_is_refused_unless_any_is_allowed(invoke, run_files, tmp_path, fact):
     train, test = run_files
