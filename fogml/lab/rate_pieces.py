@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.runs.settling import LEAST_ROWS, error_of_mean, settling_rows
@@ -90,7 +90,8 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
         Its oscillations, which hold none.
     settle_s
         Left out at the begin of each but the first [s]; if None as long as outputs of all plateaus together
-        show that gyro and table have not settled, half of a plateau at most.
+        show that gyro and table have not settled, and at the end as long as they show that they have left it
+        before the recorded rate did, half of a plateau at most.
 
     Raises
     ------
@@ -105,26 +106,45 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
         turning[wave.start : wave.stop] = True
     changes = (np.abs(np.diff(rate)) > _NOISES * white_noise(rate[~turning])) | turning[1:] | turning[:-1]
     steps = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(rate)]]).astype(np.intp)
-    lasting = np.flatnonzero(np.diff(steps[:-1]) >= LEAST_ROWS) + 1
-    starts, heights = steps[lasting], 3600.0 * (rate[steps[lasting]] - rate[steps[lasting] - 1])
-    settling = settling_rows(output, starts, steps[lasting + 1], heights, SETTLING_ROWS)
+    settling, leaving = _unsettled(output, rate, steps) if settle_s is None else (0, 0)
     rows = []
     for start, stop in zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True):
-        settled = start
+        settled, left, most = start, stop, max(SETTLING_ROWS, (stop - start) // 2)
         if start and settle_s is not None:
             settled = int(np.searchsorted(time, time[start] + settle_s))
         elif start:
-            settled = start + min(settling, max(SETTLING_ROWS, (stop - start) // 2))
+            settled = start + min(settling, most)
+        if stop < len(rate):
+            left = stop - min(leaving, most)
         parts = [start, *_long_gaps(run, start, stop), stop]
         for first, last in pairwise(parts):
-            begin = max(first, settled)
-            if last - begin >= LEAST_ROWS and last - first > 2 * LEAST_ROWS:
-                rows.append((begin, last))
+            begin, end = max(first, settled), min(last, left)
+            if end - begin >= LEAST_ROWS and last - first > 2 * LEAST_ROWS:
+                rows.append((begin, end))
     told = [_told(run, output, *pair) for pair in rows]
     columns = np.array([(*pair, *values) for pair, values in zip(rows, told, strict=True)]).reshape(-1, 7)
     start, stop = columns[:, :2].astype(np.intp).T
     values = [*columns[:, 2:].T, _clipped(output, rows)]
     return Plateaus(start, stop, *values)
+
+
+def _unsettled(output: FloatArray, rate: FloatArray, steps: IndexArray) -> tuple[int, int]:
+    """Rows at the begin of plateaus in which gyro and table have not settled, and at the end in which they
+    have left, as where the recorded rate comes late; by all plateaus between `steps` together.
+
+    Either is told by plateaus without the other, which the begin is looked into twice for.
+    """
+    first, last, count = steps[:-1], steps[1:], len(output)
+    rise = 3600.0 * (rate[first[1:]] - rate[first[1:] - 1])
+    lasting = last - first >= LEAST_ROWS
+    begins, ends = lasting[1:], lasting[:-1]
+    settling = leaving = 0
+    for _ in range(2):
+        kept = np.append(last[:-1] - leaving, last[-1])[1:]
+        settling = settling_rows(output, first[1:][begins], kept[begins], rise[begins], SETTLING_ROWS)
+        kept = count - (np.append(0, first[1:] + settling))[:-1]
+        leaving = settling_rows(output[::-1], count - last[:-1][ends], kept[ends], -rise[ends], 0)
+    return settling, leaving
 
 
 def _clipped(

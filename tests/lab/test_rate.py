@@ -375,3 +375,19 @@ def test_a_rate_at_which_the_output_is_cut_off_is_beyond_the_range() -> None:
     # Neither coarse counts nor an output without noise are cut off.
     for gyro in (500.0 * np.round(run.gyro / 500.0), 1.0002 * 3600.0 * run.columns["rate"]):
         assert rate_json([run.with_columns(gyro=gyro)], source="whole")["range"]["exceeded_deg_s"] is None
+
+
+@pytest.mark.parametrize("late", [0, 3, -3])
+def test_a_rate_that_is_recorded_late_or_early_moves_no_scale_factor(late):
+    """Plateaus held what the gyro saw of the next rate: with a second of 60 the scale factor was 4 % off."""
+    rates = np.array([0.0, *(sign * size for size in (5.0, 20.0, 50.0) for sign in (1.0, -1.0)), 0.0])
+    true = np.repeat(rates, 60)
+    noise = 0.1 * np.random.default_rng(4).standard_normal(len(true))
+    gyro = 3600.0 * true * (1.0 + 80e-6) + 2.0 + noise
+    recorded = true[np.clip(np.arange(len(true)) - late, 0, len(true) - 1)]
+    run = Run.from_columns("late", Facts(), time=np.arange(float(len(true))), gyro=gyro, rate=recorded)
+    line = rate_json([run], source="")["scale_factor"]
+    # A mean over 50 rows of 0.1 deg/h is told to 0.014 deg/h, 0.08 ppm of the greatest rate.
+    assert line["scale_factor"] == pytest.approx(1.0 + 80e-6, abs=0.3e-6)
+    assert line["ci90"][0] < 1.0 + 80e-6 < line["ci90"][1]
+    assert line["nonlinearity_ppm"] < 0.5
