@@ -184,8 +184,12 @@ def _holds_figures(cells: Sequence[str]) -> bool:
 
 def _column_widths(columns: Sequence[Sequence[str]], width: int) -> list[int] | None:
     """Widths in which no word is broken, wider where there is room; None where words alone don't fit."""
-    whole = [max(map(len, cells)) for cells in columns]
-    widths = [max((len(word) for cell in cells for word in cell.split()), default=1) for cells in columns]
+    from rich.cells import cell_len  # a Chinese sign takes two
+
+    whole = [max(map(cell_len, cells)) for cells in columns]
+    widths = [
+        max((cell_len(word) for cell in cells for word in cell.split()), default=1) for cells in columns
+    ]
     room = width - sum(widths)
     if room < 0:
         return None

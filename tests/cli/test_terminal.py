@@ -31,6 +31,14 @@ def test_words_stay_whole_where_they_fit(columns: int, monkeypatch, capsys) -> N
     assert {word for row in [HEADER, *WAYS] for cell in row for word in cell.split()} <= set(told.split())
 
 
+def test_chinese_names_stay_whole_though_their_signs_are_two_wide(monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    Terminal().table(
+        "", ["column", "unit", "mean"], [["转台速率", "deg/s", "0"], ["壳体温度", "degC", "25.0"]]
+    )
+    assert {"转台速率", "壳体温度"} <= set(capsys.readouterr().out.split())
+
+
 def test_words_of_a_page_s_table_stay_whole_at_80(monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     names = {id: declared.title for id, declared in effects().items()}
