@@ -109,6 +109,8 @@ def reader_of_content(head: bytes, suffix: str) -> Reader | None:
         return _BY_NAME["npz"] if b".npy" in head[30:1024] else next(iter(named), _BY_NAME["packed"])
     if head.startswith(_BY_NAME["hdf5"].magic) and suffix == ".mat":
         return _BY_NAME["mat"]
+    if head.startswith(b"SQLite") and suffix not in _BY_NAME["rosbag"].suffixes:
+        return None  # another database
     # Version 2 of miniSEED begins with a number of six digits, a quality and a blank.
     if len(head) > 20 and head[:6].isdigit() and head[6:7] in b"DRQM" and head[7:8] in b" \0":
         return _BY_NAME["miniseed"]

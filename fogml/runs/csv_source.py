@@ -259,7 +259,11 @@ def marks_of(source: CsvSource, rows: Sequence[Sequence[str]], separator: str) -
             continue
         # Numbers such as 10.78 beside 1,000: all that have a comma are groups of three, and points are not.
         if with_mark[mark] and not in_threes[mark]:
-            return Marks(mark, True)
+            # A column of both was put together from two programs' numbers.
+            is_mixed = any(
+                all(set(column) & set(found) for found in with_mark.values()) for column in _columns(rows)
+            )
+            return Marks(mark, True, _doubt(with_mark[other][0], mark, True) if is_mixed else None)
         if not with_mark[mark] and any(_is_of_thousands(column, mark) for column in _columns(rows)):
             return Marks(mark, True, _doubt(with_mark[other][0], mark, True))
     if separator == "," and in_threes[","]:

@@ -86,7 +86,9 @@ def stamps_apart(content: bytes, layout: TextLayout) -> bytes:
 
 def mark_of_line_stamps(lines: Sequence[str]) -> str | None:
     """What stands between a stamp and the rest of most lines, where a terminal program wrote them."""
-    marks = Counter(found[2] for line in lines if (found := _AFTER_STAMP.match(line)))
+    # A first cell that is a date as a whole, with AM or a zone after it, has no text of a device in it.
+    logged = [line for line in lines if stamp_form([re.split("[,;\t]", line)[0].strip(' "')]) is None]
+    marks = Counter(found[2] for line in logged if (found := _AFTER_STAMP.match(line)))
     mark, count = max(marks.items(), key=lambda one: one[1], default=("", 0))
     return mark if 2 * count > len(lines) else None
 

@@ -156,11 +156,22 @@ def _check_text(path: Path, head: bytes) -> None:
 
 _HEAD_BYTES = 1024
 _CSV_SUFFIXES = (".csv", ".tsv")
+_JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 _FOREIGN = {
     b"7z\xbc\xaf": "a 7-Zip archive; unpack it first",
     b"%PDF": "a PDF; export the table as CSV",
     b"ARROW1": "a Feather (Arrow) file; write it as Parquet",
-    b"\x93NUMPY": "one NumPy array, whose columns have no names; write it with names, as numpy.savez does",
+    b"ORC": "an ORC file; write it as Parquet",
+    b"<stata_dta>": "a Stata file; write it as Parquet or CSV",
+    b"$FL": "an SPSS file; write it as Parquet or CSV",
+    bytes(12) + b"\xc2\xea\x81\x60": "a SAS file; write it as Parquet or CSV",
+    b"\x80\x04\x95": "a pickle, which would run what it holds; write it as Parquet",
+    b"\x80\x05\x95": "a pickle, which would run what it holds; write it as Parquet",
+    b"CDF\x01": "a netCDF 3 file; write it as netCDF 4, which is HDF5, or as CSV",
+    b"CDF\x02": "a netCDF 3 file; write it as netCDF 4, which is HDF5, or as CSV",
+    b"r\x02\x01\0": "a Stata file; write it as Parquet or CSV",
+    b"SQLite format 3\0": "an SQLite database; write its table as CSV or Parquet",
+    **dict.fromkeys((b"<html", b"<!doctype", b"<table", b"<?xml"), "a page or XML; save its table as CSV"),
 }
 
 
@@ -219,7 +230,8 @@ def file_format(path: Path) -> str:
         return kind
     if kind == "csv":
         label = stated[0].label
-        raise InputError(f"{path.name}: damaged or no {label} file (its first bytes are not {label}'s)")
+        told = f"damaged or no {label} file (its first bytes are not {label}'s)"
+        raise InputError(f"{path.name}: {told}; if it is text, rename it to '{path.stem}.csv'")
     reader = reader_of(kind)
     if not stated and suffix not in _CSV_SUFFIXES:
         return kind
@@ -254,6 +266,8 @@ def _format_of_content(path: Path) -> str:
     if (reader := reader_of_content(head, path.suffix)) is not None:
         return reader.name
     for magic, what in _FOREIGN.items():
-        if head.startswith(magic):
+        if head.startswith(magic) or head.lower().lstrip().startswith(magic):
             raise InputError(f"{path.name}: is {what}")
+    if path.suffix.lower() in _JSON_SUFFIXES and head.lstrip().startswith((b"{", b"[")):
+        raise InputError(f"{path.name}: is JSON; write its columns as CSV or Parquet")
     return "csv"

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+import sqlite3
 import zipfile
+from contextlib import closing
 from datetime import datetime, timedelta
 
 import numpy as np
 import openpyxl
+import pandas as pd
 import pytest
 
 from fogml.errors import InputError
@@ -162,6 +165,16 @@ def test_true_and_false_are_a_switch_and_no_temperature(tmp_path):
         InputError, match=r"run.xlsx, line 6, column 'T': holds TRUE or FALSE, where a number"
     ):
         read_run(path)
+
+
+def test_a_column_of_numbers_and_of_text_with_a_comma_is_told(tmp_path):
+    """A paste that a spreadsheet program took for text in some rows: 1000 times too much, or right."""
+    rows = [[i, 9.25 + i / 1000 if i % 5 else f"9,{250 + i}", 20.5 + i / 10] for i in range(40)]
+    book_of(
+        path := tmp_path / "run.xlsx", [("run", False, [["time [s]", "gyro [deg/h]", "T [degC]"], *rows])]
+    )
+    (told,) = (f.message for f in read_run(path).findings if "are read as" in f.message)
+    assert "'9,250' are read as 9250; where 9.25 is meant" in told
 
 
 def test_a_second_sheet_with_a_run_is_told(tmp_path):
@@ -420,3 +433,27 @@ def test_durations_of_a_profile_and_beside_a_clock_are_seconds(tmp_path):
     run = read_run(tmp_path / "book.xlsx")
     np.testing.assert_allclose(run.time, 20.0 * np.arange(9.0), atol=1e-6)
     np.testing.assert_allclose(run.columns["Held"], 7.0 * np.arange(9.0), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "said"),
+    [
+        ("log.dta", pd.DataFrame.to_stata, "a Stata file; write it as Parquet or CSV"),
+        ("log.json", pd.DataFrame.to_json, "JSON; write its columns as CSV or Parquet"),
+        ("log.pkl", pd.DataFrame.to_pickle, "a pickle, which would run what it holds"),
+        ("log.xls", pd.DataFrame.to_html, "a page or XML; save its table as CSV"),
+        ("log.orc", pd.DataFrame.to_orc, "an ORC file; write it as Parquet"),
+        ("log.xls", pd.DataFrame.to_csv, "if it is text, rename it to 'log.csv'"),
+    ],
+)
+def test_formats_that_are_not_read_are_named_with_a_way_on(tmp_path, name, write, said):
+    write(pd.DataFrame({"time": [0.0, 1.0], "gyro": [1.0, 2.0]}), tmp_path / name)
+    with pytest.raises(InputError, match=said):
+        read_run(tmp_path / name)
+
+
+def test_a_database_that_is_no_bag_is_named(tmp_path):
+    with closing(sqlite3.connect(tmp_path / "log.db")) as base:
+        base.execute("create table log (time, gyro)")
+    with pytest.raises(InputError, match="an SQLite database; write its table as CSV or Parquet"):
+        read_run(tmp_path / "log.db")

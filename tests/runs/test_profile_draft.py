@@ -430,6 +430,17 @@ def test_stamps_of_a_terminal_before_each_line_are_its_clock(tmp_path, line, mar
     np.testing.assert_allclose(run.time, np.arange(COUNT), atol=1e-9)
 
 
+@pytest.mark.parametrize("after", [" AM", " UTC", " +02:00"])
+def test_what_ends_a_date_is_no_text_of_a_device(tmp_path, after):
+    rows = [f"2026-03-11 10:15:{i:02d}{after},{9.5 + i},{20.5 + 0.1 * i}" for i in range(COUNT)]
+    (tmp_path / "log.csv").write_text("\n".join(["When,Gyro [deg/h],T [degC]", *rows, ""]))
+    draft = draft_profile(tmp_path / "log.csv")
+    (tmp_path / "profile.yaml").write_text(draft)
+    (run,) = import_recording(tmp_path / "log.csv", tmp_path / "profile.yaml")
+    np.testing.assert_allclose(run.gyro, 9.5 + np.arange(COUNT))
+    np.testing.assert_allclose(run.columns["T"], 20.5 + 0.1 * np.arange(COUNT))
+
+
 def test_the_first_rows_of_counts_are_in_counts(tmp_path):
     rows = "".join(f"{i},{1000 + i % 7}\n" for i in range(COUNT))
     (tmp_path / "log.csv").write_text("time [s],gyro [count]\n" + rows)
