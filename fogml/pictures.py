@@ -197,7 +197,7 @@ _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 _BLANK = 0x2800
 
 
-def braille(values: FloatArray, width: int = 60, height: int = 3) -> list[str]:
+def braille(values: FloatArray, width: int, height: int = 3) -> list[str]:
     """A curve as lines of text, highest values first, on a scale that holds zero.
 
     Each column of dots spans from the least to the greatest value of its part of the curve.

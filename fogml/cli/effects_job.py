@@ -116,7 +116,6 @@ def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
 
 
 def _print_pictures(id: str, terminal: Terminal) -> None:
-    from fogml.pictures import braille
     from fogml.twin.pictures import pictures
 
     declared = effect(id)
@@ -127,7 +126,7 @@ def _print_pictures(id: str, terminal: Terminal) -> None:
         terminal.say("")
         terminal.say(f"{picture.programme}: {span}")
         if low != high:
-            terminal.say("\n".join(braille(picture.values)))
+            terminal.curve(picture.values)
 
 
 def _best_first(declared: Effect, names: Sequence[str]) -> list[str]:

@@ -21,6 +21,7 @@ from fogml.numerals import percent
 from fogml.processes import heed_interrupt
 
 if TYPE_CHECKING:
+    from fogml.arrays import FloatArray
     from fogml.report.page import Tile
     from fogml.report.tables import Table
 
@@ -88,6 +89,14 @@ class Terminal:
         from rich.markdown import Markdown
 
         Console(markup=False).print(Markdown(terminal_text(text, sys.stdout.encoding)))
+
+    def curve(self, values: FloatArray) -> None:
+        """A curve on stdout for people, no wider than the terminal; none where an encoding lacks the dots."""
+        from fogml.pictures import braille
+
+        text = "\n".join(braille(values, min(_CURVE, shutil.get_terminal_size().columns)))
+        if terminal_text(text, sys.stdout.encoding) == text:
+            self.say(text)
 
     def result(self, values: Any) -> None:
         """The result on stdout, where JSON is asked for."""
@@ -169,6 +178,8 @@ def fitted(text: str, stream: TextIO) -> str:
     return textwrap.fill(text, width, subsequent_indent=below, break_long_words=False, break_on_hyphens=False)
 
 
+_CURVE = 60
+"""Most characters that a curve is wide: with some beside it in a terminal of 80."""
 _UNBOUNDED = 10_000
 """Width of a table that nobody sees in a terminal [characters]."""
 _FIGURE = re.compile("[-−+]?[0-9]")

@@ -155,6 +155,10 @@ def test_a_locale_of_ascii(tmp_path):
     assert found.returncode == 0, found.stderr
     assert found.stdout.isascii() and found.stderr.isascii()
     json.loads((tmp_path / "out" / "noise.json").read_text(encoding="utf-8"))
+    card = subprocess.run(
+        [*PROGRAM, "effects", "kerr"], env={**os.environ, **ascii_only}, capture_output=True, timeout=120
+    )
+    assert card.stdout.isascii() and b"10^-5 to" in card.stdout and b"??" not in card.stdout
 
 
 @pytest.mark.parametrize(

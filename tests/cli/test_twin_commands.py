@@ -191,6 +191,13 @@ def test_effects_lists_the_catalogue(invoke_json, invoke):
     assert any(line.split() == row.split() for line in lines)
 
 
+def test_a_curve_is_no_wider_than_the_terminal_and_no_line_of_question_marks(invoke, monkeypatch):
+    for columns, width in (("200", 60), ("40", 40)):
+        monkeypatch.setenv("COLUMNS", columns)
+        drawn = [line for line in invoke("effects", "kerr").stdout.splitlines() if line[:1] >= "\u2800"]
+        assert {len(line) for line in drawn} == {width}
+
+
 def test_formulas_of_a_card_stand_below_each_other(invoke):
     lines = invoke("effects", "thermal_shock").stdout.splitlines()
     first = lines.index("    b = J q,")
