@@ -146,8 +146,10 @@ def test_misra_rules_hold_save_those_listed(model_of, tmp_path, name, dtype, sam
     hold_misra(tmp_path)
 
 
-def test_misra_rules_hold_of_all_axes_and_of_tables(axes, tmp_path):
+def test_misra_rules_hold_of_all_axes_and_of_tables(axes, tmp_path, monkeypatch):
     needs("cppcheck")
+    # Sizes and cycles on another machine say nothing of rules.
+    monkeypatch.setattr("fogml.export.export.cortex_m4_size", lambda *_: None)
     models = [model for model, _ in axes.values()]
     export_axes(models, tmp_path, ExportSettings())
     hold_misra(tmp_path)
