@@ -3,9 +3,10 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from fogml.gap.grids import Grids
-from fogml.gap.thermal_families import transition
+from fogml.gap.thermal_families import polarization, transition
 from fogml.signals.bases import bumps, preisach, relays
 from fogml.signals.recursions import play_kernel
 from fogml.signals.smoothing import smoothed, window_difference
@@ -74,3 +75,19 @@ def test_the_peak_of_a_transition_is_its_steps_rate():
         step, peak = block.columns[:, 0], block.columns[:, 1]
         expected = 60.0 * np.gradient(step, time) * block.shape["width"]
         np.testing.assert_allclose(peak[1:-1], expected[1:-1], atol=2e-3 * np.abs(peak).max())
+
+
+def test_waves_over_temperature_go_from_the_longest_period_on_a_step_apart():
+    """Of the grid's periods the shortest may be left out, where there are more waves than are taken."""
+    temperature, grids = np.linspace(5.0, 45.0, 400), Grids()
+    rows = SimpleNamespace(of=lambda values: values)
+    place = SimpleNamespace(temperature=temperature, name="optics", weight=0.0)
+    scene = SimpleNamespace(grids=grids, span_degc=40.0, optics=lambda rows: [place])
+    blocks = list(polarization(rows, scene, None))
+    cycles = np.array([1.0 / block.shape["period"] for block in blocks])
+    assert 1.0 / cycles[0] == max(grids.periods_degc) and 1.0 / cycles[-1] >= min(grids.periods_degc) - 1e-9
+    assert np.diff(cycles) * 40.0 == pytest.approx(np.full(len(cycles) - 1, np.diff(cycles)[0] * 40.0))
+    assert np.diff(cycles)[0] * 40.0 <= grids.cycles_apart * len(cycles) / (len(cycles) - 1) * (1.0 + 1e-9)
+    for block in blocks:
+        turned = 2.0 * np.pi * (temperature - 25.0) / block.shape["period"]
+        np.testing.assert_allclose(np.arctan2(*block.columns.T), np.arctan2(np.sin(turned), np.cos(turned)))
