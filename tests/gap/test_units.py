@@ -1,7 +1,9 @@
 """Several units: causes shared, sizes each unit's own, what the next unit may have."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from fogml.errors import InputError
@@ -87,3 +89,39 @@ def test_the_next_units_size_is_a_possible_one():
         found = SimpleNamespace(scene=SimpleNamespace(candidates=candidates), plant=SimpleNamespace(on=on))
         _, _, (low, high) = units._going_over(sizes, "deg/h", units._possible(found, id))
         assert (low, high) == pytest.approx((least, free[1]))
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A set of causes that a search kept, by family."""
+
+    named: tuple[int, ...]
+    by_noise: tuple[float, ...]
+    log_evidence: float = 0.0
+
+    @property
+    def score(self):
+        return float(np.logaddexp.reduce(self.by_noise))
+
+
+def test_what_a_unit_says_of_a_set_is_the_sum_of_what_it_kept_of_it_else_of_one_made_for_it():
+    """Bend was kept alone and beside what is unknown; creep never, it is less likely than the best."""
+    kept = [Kept((0,), (-1.0, -1.5)), Kept((0, 2), (-2.0,)), Kept((), (-3.0,), -1.2)]
+    search = SimpleNamespace(
+        names=lambda e: e.named,
+        families_of=lambda kind: (0, 1),
+        log_odds=(-2.0, -1.5, -0.5),
+        grown=lambda e, more: Kept((*e.named, *more), (0.0,), -7.0),
+    )
+    found = SimpleNamespace(
+        explanations=kept,
+        search=search,
+        columns=SimpleNamespace(families=[SimpleNamespace(id=id) for id in ("bend", "creep", "unknown")]),
+        setting=SimpleNamespace(priors=SimpleNamespace(least_size=0.1)),
+        field=SimpleNamespace(shows=lambda family, least: True),
+    )
+    told = units._Told(found)
+    assert told.sets == {frozenset(), frozenset({"bend"})}
+    assert told.score(frozenset({"bend"})) == pytest.approx(np.log(np.exp([-1.0, -1.5, -2.0]).sum()) + 2.0)
+    assert told.score(frozenset({"creep"})) == pytest.approx(np.log(np.exp([-8.0, -8.5]).sum()) + 1.5)
+    assert told.score(frozenset()) == pytest.approx(-3.0)
