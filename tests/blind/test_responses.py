@@ -14,7 +14,7 @@ import pytest
 
 from fogml.blind.first.effects.electrical import Crosstalk, PolarisationChirped
 from fogml.blind.first.effects.invented import HotBursts
-from fogml.blind.first.effects.turning import HuntingServo
+from fogml.blind.first.effects.turning import HuntingServo, SourceBent
 from fogml.blind.first.programme import _chamber_path
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Additive, Form
@@ -90,6 +90,13 @@ def test_loops_of_grains_scatter_about_their_typical_width() -> None:
         spreads.append(np.var(widths, ddof=1))
     # Leans of up to 0.02 over centres from -30 to 60 scatter by 0.3 on the whole.
     assert np.mean(spreads) == pytest.approx(0.4**2 + 0.02**2 / 3.0 * 90.0**2 / 12.0, rel=0.1)
+
+
+def test_a_scale_factor_error_is_told_in_parts_of_a_million_of_the_rate() -> None:
+    """By its form 1000 ppm/degC at 15 degC above the middle lose 15 000 ppm: 1.5 % of 10 deg/s."""
+    shown = world(rate_deg_h=np.full(len(TIME), 36_000.0))
+    found = 1000.0 * SourceBent().response(shown, {"bend": 0.0}, np.random.default_rng(1))
+    assert found == pytest.approx(np.full(len(TIME), -540.0))
 
 
 def test_a_hunting_servo_swings_in_its_period() -> None:
