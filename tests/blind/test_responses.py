@@ -21,8 +21,10 @@ from fogml.blind.frame.form import Additive, Form
 from fogml.blind.frame.noise import StateNoise
 from fogml.blind.frame.record import EARTH_DEG_H
 from fogml.blind.plan import REALITIES, reality
+from fogml.blind.second.effects.driven import RattleThreshold
 from fogml.blind.second.effects.lasting import _clusters
 from fogml.blind.second.reality import _field, humidity_of
+from fogml.blind.third.effects.driven import CreepingClock
 from fogml.twin.registry import effects
 
 TIME = 10.0 * np.arange(6000.0)
@@ -97,6 +99,26 @@ def test_a_scale_factor_error_is_told_in_parts_of_a_million_of_the_rate() -> Non
     shown = world(rate_deg_h=np.full(len(TIME), 36_000.0))
     found = 1000.0 * SourceBent().response(shown, {"bend": 0.0}, np.random.default_rng(1))
     assert found == pytest.approx(np.full(len(TIME), -540.0))
+
+
+def test_rattling_grows_with_its_power_of_what_exceeds_the_threshold() -> None:
+    found = [
+        RattleThreshold().response(
+            world(drives={"vibration": np.full(len(TIME), 0.02 + above)}),
+            {"threshold": 0.02, "exponent": 1.7},
+            np.random.default_rng(1),
+        )[0]
+        for above in (-0.01, 0.1, 0.2)
+    ]
+    assert found == pytest.approx([0.0, 0.01, 0.01 * 2.0**1.7])
+
+
+def test_a_clock_that_creeps_is_later_by_a_share_of_its_delay_each_hour() -> None:
+    """An output that tells the time tells by how much it is late."""
+    found = CreepingClock().distorted(TIME, world(), 4.0, {"growth": 0.25, "by_heat": 0.0})
+    assert (TIME - found)[360::360] == pytest.approx(
+        4.0 + np.arange(1.0, len(TIME) // 360 + 1)[: len(found[360::360])]
+    )
 
 
 def test_a_hunting_servo_swings_in_its_period() -> None:
