@@ -20,8 +20,8 @@ ENDLESS = ["app", "endless", "--port", "0"]
 
 def until(state: str, jobs: Jobs, name: str) -> None:
     """Wait for a job's state."""
-    while jobs.state(name) != state:
-        assert jobs.state(name) in ("waiting", "running"), jobs.in_full(name)
+    while (now := jobs.state(name)) != state:
+        assert now in ("waiting", "running"), jobs.in_full(name)
         jobs.start_waiting()
         time.sleep(0.02)
 
