@@ -54,13 +54,14 @@ class Reader:
     memory_per_byte: float = 0.0
 
 
-_STORED, _TABLES = "fogml.readers.stored", "fogml.readers.tables"
+_TABLES = "fogml.readers.tables"
 _VEHICLES, _MESSAGES = "fogml.readers.vehicles", "fogml.readers.messages"
 READERS = (
     Reader("parquet", "Parquet", (".parquet", ".pq"), (b"PAR1",), "fogml.readers.parquet:Parquet",
            "pyarrow.parquet"),
-    Reader("hdf5", "HDF5", (".h5", ".hdf5"), (b"\x89HDF\r\n\x1a\n",), f"{_STORED}:Hdf5", "h5py", "hdf5"),
-    Reader("mat", "MATLAB", (".mat",), (b"MATLAB",), f"{_STORED}:Mat", "scipy.io"),
+    Reader("hdf5", "HDF5", (".h5", ".hdf5"), (b"\x89HDF\r\n\x1a\n",), "fogml.readers.stored:Hdf5", "h5py",
+           "hdf5"),
+    Reader("mat", "MATLAB", (".mat",), (b"MATLAB",), "fogml.readers.matlab:Mat", "scipy.io"),
     Reader("npz", "NumPy", (".npz",), (), f"{_TABLES}:Npz", "numpy"),
     Reader("workbook", "Excel or OpenDocument", (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
            (b"\xd0\xcf\x11\xe0",), f"{_TABLES}:Workbook", "python_calamine", "xlsx", 2.0, 400.0),

@@ -1,14 +1,12 @@
-"""Readers of HDF5 and MATLAB files: their arrays, and what stands beside them.
+"""The reader of HDF5 files, and what others share with it: their arrays, and what stands beside them.
 
 Each format is a class with `arrays`, `told` (what the parent hears of them) and `close`.
 """
 
 from __future__ import annotations
 
-import tempfile
-import weakref
-from collections.abc import Iterator, Mapping
-from typing import Any, Literal
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -16,12 +14,8 @@ from fogml.readers.columns import MOST_COLUMNS
 
 _PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
 MOST_NAMES = 10_000
-_MOST_TEXT = 1 << 20
-_LONG_BYTES = 1 << 20  # of an array that is put away; a file of shorter ones takes little memory
-_DEEPEST = 4  # of groups that HDF5 makes of a unit with slashes
-_HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
-_USER_BLOCK = 512
-_RESERVED = ("units", "facts")
+MOST_TEXT = 1 << 20
+DEEPEST = 4  # of groups within groups, as HDF5 makes them of a unit with slashes, too
 
 
 class Refused(Exception):
@@ -37,50 +31,15 @@ def described(name: str, array: Any, unit: Any = None, fault: str | None = None)
     return told
 
 
-class Hdf5:
-    """An HDF5 file: datasets of its root or of the group ``run``."""
+class Hdf5File:
+    """An HDF5 file, and what of it is not read."""
 
-    def __init__(self, path: str, keys: list[str]) -> None:
+    def __init__(self, path: str) -> None:
         import h5py
 
         self.h5py = h5py
         self.file = h5py.File(path, "r")
         self.seen = 0
-        link = self.file.get("run", getlink=True)
-        is_group = isinstance(link, h5py.HardLink) and isinstance(self.file["run"], h5py.Group)
-        group = self.file["run"] if is_group else self.only_group(self.file)
-        self.arrays: list[Any] = []
-        told = []
-        for name, item, fault in self.datasets(group):
-            unit = None if fault else item.attrs.get("unit", item.attrs.get("units"))
-            self.arrays.append(item)
-            told.append(described(name, item, None if unit is None else text_of(unit), fault))
-        stated = {key: plain(group.attrs[key]) for key in keys if key in group.attrs}
-        self.told = {"arrays": told, "facts": stated}
-
-    def only_group(self, group: Any) -> Any:
-        """The group that holds the datasets, where it is all that the one above it holds."""
-        for _ in range(_DEEPEST):
-            names = list(group) if len(group) == 1 else []
-            is_hard = names and isinstance(group.get(names[0], getlink=True), self.h5py.HardLink)
-            if not is_hard or "[" in names[0] or not isinstance(group[names[0]], self.h5py.Group):
-                break
-            group = group[names[0]]
-        return group
-
-    def datasets(self, group: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str, Any, str | None]]:
-        """Datasets by name, also where the unit holds a slash, with what keeps them from being read."""
-        for name in group:
-            self.count()
-            full = above + name
-            if not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
-                yield full, None, "is a link to another place"
-                continue
-            item = group[name]
-            if isinstance(item, self.h5py.Dataset):
-                yield full, item, self.fault_of(item)
-            elif isinstance(item, self.h5py.Group) and "[" in full and depth < _DEEPEST:
-                yield from self.datasets(item, full + "/", depth + 1)
 
     def count(self) -> None:
         """Count a name, or what is referred to.
@@ -109,162 +68,58 @@ class Hdf5:
         self.file.close()
 
 
-class Mat:
-    """A MATLAB file: variables at the top or in the struct ``run``."""
+class Hdf5(Hdf5File):
+    """An HDF5 file: datasets of its root or of the group ``run``, and those of groups within."""
 
     def __init__(self, path: str, keys: list[str]) -> None:
-        with open(path, "rb") as file:
-            head = file.read(_USER_BLOCK + len(_HDF5_MAGIC))
-        is_hdf5 = head.startswith(_HDF5_MAGIC) or head[_USER_BLOCK:].startswith(_HDF5_MAGIC)
-        self.opened = Hdf5(path, []) if is_hdf5 else None
-        variables = self.members(self.opened.file) if self.opened else self.loaded(path)
-        run = variables.get("run")
-        held: Mapping[str, Any] = run if isinstance(run, dict) else variables
-        units = held.get("units", variables.get("units", {}))
-        facts = held.get("facts", variables.get("facts"))
-        columns = [column for group in self.groups(held) for column in group]
-        self.arrays = [array for *_, array in columns]
-        told = [
-            described(name, array, unit, self.fault_of(array)) | {"group": group}
-            for group, name, unit, array in columns
-        ]
-        self.told = {
-            "arrays": told,
-            "units": {str(k): text_of(v) for k, v in units.items()} if isinstance(units, dict) else None,
-            "facts": plain_struct(facts),
-        }
+        super().__init__(path)
+        link = self.file.get("run", getlink=True)
+        is_group = isinstance(link, self.h5py.HardLink) and isinstance(self.file["run"], self.h5py.Group)
+        top = self.file["run"] if is_group else self.only_group(self.file)
+        self.arrays: list[Any] = []
+        told = []
+        for group, name, item, fault in self.within(top):
+            columns = [(group, name, item)] if fault else fields_of(group, name, item)
+            unit = None if fault else unit_of(item.attrs)
+            for place, column, array in columns:
+                if len(self.arrays) >= MOST_NAMES:
+                    raise Refused(f"more than {MOST_NAMES} columns")
+                self.arrays.append(array if fault else scaled(array, item.attrs))
+                told.append(described(column, array, unit, fault) | {"group": place[:200]})
+        stated = {key: plain(top.attrs[key]) for key in keys if key in top.attrs}
+        self.told = {"arrays": told, "facts": stated}
 
-    def groups(self, held: Mapping[str, Any], above: str = "") -> Iterator[list[tuple[str, str, Any, Any]]]:
-        """Group, name, unit and array of each column, of the structs within a struct too."""
-        own = held.get("units")
-        units = own if isinstance(own, dict) else {}
-        held = apart(held)
-        names = [name for name in held if name not in _RESERVED]
-        plain = [name for name in names if not isinstance(held[name], dict)]
-        yield [
-            (above, column, units.get(name) and text_of(units[name]), array)
-            for name in plain
-            for column, array in columns_of(name, self.array(held[name]))
-        ]
-        for name in names:
-            if isinstance(held[name], dict):
-                yield from self.groups(held[name], f"{above}.{name}" if above else name)
+    def within(self, group: Any, above: str = "") -> Iterator[tuple[str, str, Any, str | None]]:
+        """Group, name and fault of each dataset of a group and of those within it."""
+        yield from ((above, *found) for found in self.datasets(group))
+        for name in group if above.count("/") < DEEPEST - 1 else ():
+            is_hard = isinstance(group.get(name, getlink=True), self.h5py.HardLink)
+            if is_hard and "[" not in name and isinstance(group[name], self.h5py.Group):
+                yield from self.within(group[name], f"{above}/{name}" if above else name)
 
-    @staticmethod
-    def loaded(path: str) -> dict[str, Any]:
-        """Variables of a version 5 file: one at a time is held, its long arrays go into temporary files."""
-        from scipy.io import loadmat, whosmat
+    def only_group(self, group: Any) -> Any:
+        """The group that holds the datasets, where it is all that the one above it holds."""
+        for _ in range(DEEPEST):
+            names = list(group) if len(group) == 1 else []
+            is_hard = names and isinstance(group.get(names[0], getlink=True), self.h5py.HardLink)
+            if not is_hard or "[" in names[0] or not isinstance(group[names[0]], self.h5py.Group):
+                break
+            group = group[names[0]]
+        return group
 
-        found = {}
-        for name in dict.fromkeys(name for name, *_ in whosmat(path)):
-            held = loadmat(path, simplify_cells=True, chars_as_strings=True, variable_names=[name])
-            found[name] = put_away(held.pop(name))
-        return found
-
-    def fault_of(self, array: Any) -> str | None:
-        """As `Hdf5.fault_of`; what is in memory has none."""
-        array = getattr(array, "matrix", array)
-        return self.opened.fault_of(array) if self.opened and is_dataset(array) else None
-
-    def members(self, group: Any, depth: int = 0) -> dict[str, Any]:
-        """Variables of a version 7.3 file: groups are structs, text is read, samples are not yet."""
-        assert self.opened is not None
-        h5py = self.opened.h5py
-        found: dict[str, Any] = {}
+    def datasets(self, group: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str, Any, str | None]]:
+        """Datasets by name, also where the unit holds a slash, with what keeps them from being read."""
         for name in group:
-            is_member = isinstance(group.get(name, getlink=True), h5py.HardLink) and not name.startswith("#")
-            if is_member and (value := self.member(group[name], depth)) is not None:
-                found[name] = value
-        return found
-
-    def member(self, item: Any, depth: int) -> Any:
-        """A struct, a list of structs, a text, or samples that are not read yet; None for what is none."""
-        assert self.opened is not None
-        self.opened.count()
-        if isinstance(item, self.opened.h5py.Group) and depth < _DEEPEST:
-            held = self.members(item, depth + 1)
-            return self.each_struct(held, depth) if held and all(map(self.refers, held.values())) else held
-        if is_dataset(item):
-            return self.text(item) if _class_of(item) == "char" else item
-        return None
-
-    def refers(self, value: Any) -> bool:
-        """Whether it is a field of an array of structs: references to what each of them holds."""
-        assert self.opened is not None
-        is_reference = is_dataset(value) and value.dtype == self.opened.h5py.ref_dtype
-        return is_reference and not _class_of(value) and self.opened.fault_of(value) is None
-
-    def each_struct(self, fields: Mapping[str, Any], depth: int) -> list[dict[str, Any]]:
-        """The structs of an array of structs, as MATLAB counts them."""
-        assert self.opened is not None
-        count = max(field.size for field in fields.values())
-        if count > MOST_NAMES:
-            raise Refused(f"an array of more than {MOST_NAMES} structs")
-        found: list[dict[str, Any]] = [{} for _ in range(count)]
-        for name, field in fields.items():
-            # MATLAB counts down the columns, and HDF5 holds its arrays turned over.
-            for struct, reference in zip(found, np.asarray(field).reshape(-1)):
-                value = self.member(self.opened.file[reference], depth + 1) if reference else None
-                if value is not None:
-                    struct[name] = value
-        return found
-
-    def text(self, item: Any) -> str:
-        if item.shape is None:
-            return ""
-        if item.size > _MOST_TEXT or self.opened is None or self.opened.fault_of(item):
-            raise Refused("a text that is too long, or stands elsewhere")
-        return "".join(chr(int(code)) for code in np.asarray(item).T.reshape(-1))
-
-    @staticmethod
-    def array(value: Any) -> Any:
-        return value if is_dataset(value) or isinstance(value, PutAway) else np.asarray(value)
-
-    def close(self) -> None:
-        self.arrays.clear()
-        if self.opened:
-            self.opened.close()
-
-
-class PutAway:
-    """An array of numbers in a temporary file; what is read of it is held no longer than it is used."""
-
-    def __init__(self, values: np.ndarray[Any, Any]) -> None:
-        self.ndim, self.shape, self.dtype = values.ndim, values.shape, values.dtype
-        # Column by column, as they are read.
-        self.order: Literal["F", "C"] = "F" if values.flags.f_contiguous else "C"
-        self.file = tempfile.TemporaryFile(prefix="fogml-")  # noqa: SIM115  closed with the object
-        weakref.finalize(self, self.file.close)
-        values.ravel(self.order).tofile(self.file)
-
-    def __getitem__(self, part: Any) -> np.ndarray[Any, Any]:
-        return np.array(np.memmap(self.file, self.dtype, "r", shape=self.shape, order=self.order)[part])
-
-
-def _class_of(dataset: Any) -> str:
-    """What MATLAB calls a dataset; nothing for a field of an array of structs."""
-    return text_of(dataset.attrs.get("MATLAB_class", b""))
-
-
-def apart(held: Mapping[str, Any]) -> dict[str, Any]:
-    """The members of a struct; of an array of structs each under its place, as MATLAB counts."""
-    found: dict[str, Any] = {}
-    for name, value in held.items():
-        is_array = isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object)
-        items = list(np.ravel(np.asarray(value, dtype=object))) if is_array else []
-        if items and all(isinstance(item, dict) for item in items[:MOST_NAMES]):
-            found |= {f"{name}({i})": item for i, item in enumerate(items[:MOST_NAMES], start=1)}
-        else:
-            found[name] = value
-    return found
-
-
-def put_away(value: Any) -> Any:
-    """A variable whose long arrays of numbers lie in temporary files."""
-    if isinstance(value, dict):
-        return {name: put_away(item) for name, item in value.items()}
-    is_long = isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.nbytes >= _LONG_BYTES
-    return PutAway(value) if is_long else value
+            self.count()
+            full = above + name
+            if not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
+                yield full, None, "is a link to another place"
+                continue
+            item = group[name]
+            if isinstance(item, self.h5py.Dataset):
+                yield full, item, self.fault_of(item)
+            elif isinstance(item, self.h5py.Group) and "[" in full and depth < DEEPEST:
+                yield from self.datasets(item, full + "/", depth + 1)
 
 
 class MatrixColumn:
@@ -290,6 +145,54 @@ def columns_of(name: str, array: Any) -> list[tuple[str, Any]]:
     return [(f"{name} column {i + 1}", MatrixColumn(array, i)) for i in range(min(array.shape))]
 
 
+class FieldColumn:
+    """A field of a table whose rows still lie in the file."""
+
+    ndim = 1
+
+    def __init__(self, table: Any, field: str) -> None:
+        self.table, self.field = table, field
+        self.shape, self.dtype = (table.size,), table.dtype[field]
+
+    def __getitem__(self, part: tuple[slice]) -> Any:
+        return self.table[(self.field, *part)]
+
+
+def fields_of(group: str, name: str, array: Any) -> list[tuple[str, str, Any]]:
+    """Group, name and array of each column of a dataset: fields of a table, columns of a long matrix."""
+    if array.dtype.names and array.ndim == 1:
+        kinds = {field: array.dtype[field] for field in array.dtype.names}
+        held = [field for field, kind in kinds.items() if kind.kind in "fiub" and not kind.shape]
+        return [(f"{group}/{name}" if group else name, field, FieldColumn(array, field)) for field in held]
+    is_square = array.ndim == 2 and array.shape[0] == array.shape[1]
+    return [(group, *column) for column in ([(name, array)] if is_square else columns_of(name, array))]
+
+
+class Scaled:
+    """Numbers that are held packed: a factor times what lies in the file, and an offset."""
+
+    def __init__(self, array: Any, factor: float, offset: float) -> None:
+        self.array, self.factor, self.offset = array, factor, offset
+        self.ndim, self.shape = array.ndim, array.shape
+
+    def __getitem__(self, part: Any) -> Any:
+        return np.asarray(self.array[part], dtype=np.float64) * self.factor + self.offset
+
+
+def scaled(array: Any, attributes: Any) -> Any:
+    """An array, unpacked as the conventions of netCDF (CF, 8.1) say where it has these attributes."""
+    stated = [plain(attributes.get(key, none)) for key, none in (("scale_factor", 1.0), ("add_offset", 0.0))]
+    if stated == [1.0, 0.0] or not all(isinstance(value, int | float) for value in stated):
+        return array
+    return Scaled(array, *stated)
+
+
+def unit_of(attributes: Any) -> str | None:
+    """The unit that stands beside a dataset."""
+    found = {key.lower(): key for key in attributes if key.lower() in ("unit", "units")}
+    return text_of(attributes[found.get("unit") or found["units"]]) if found else None
+
+
 def is_dataset(value: Any) -> bool:
     """Whether samples still lie in the file."""
     return hasattr(value, "is_virtual")
@@ -308,7 +211,7 @@ def samples(array: Any, start: int, stop: int) -> Iterator[np.ndarray[Any, Any]]
 def text_of(value: Any) -> str:
     """A text of an attribute or a variable."""
     text = value.decode("utf-8", errors="replace") if isinstance(value, bytes) else str(value)
-    return text[:_MOST_TEXT]
+    return text[:MOST_TEXT]
 
 
 def plain(value: Any) -> Any:

@@ -51,8 +51,8 @@ class Npz(Container):
                 for field in kind.names:
                     if kind[field].kind in "fiub" and not kind[field].shape:
                         self.add_rows(name, field, None, rows, field)
-        elif kind.kind in "fiub" and len(shape) == 1:
-            self.add_rows("", name, None, self.rows(file, kind, shape[0]))
+        elif kind.kind in "fiub" and len(shape) in (1, 2) and max(shape) == np.prod(shape) > 1:
+            self.add_rows("", name, None, self.rows(file, kind, max(shape)))
         elif kind.kind == "M" and len(shape) == 1 and shape[0]:
             rows = self.rows(file, kind, shape[0])
             if self.first is None:

@@ -79,8 +79,9 @@ def hdf5_blocks(
     with stored_file(path, "hdf5", (FACTS_KEY, *Facts.model_fields), limits) as stored:
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'")
-        cells = canonical_cells([stated_cell(array.name, array.unit) for array in stored.arrays])
-        vectors, findings = choose_vectors(path.name, list(zip(cells, stored.arrays, strict=True)))
+        chosen, others = _chosen(path, "hdf5", stored, {})
+        vectors, findings = choose_vectors(path.name, chosen.columns)
+        findings += others
         facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the attributes")
         yield from stored_blocks(stored, vectors, findings, facts, rows, columns)
 
@@ -133,7 +134,7 @@ def mat_blocks(
             raise InputError(f"{path.name}: 'units' must be a struct of texts, e.g. units.time = 's'")
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no numeric vectors; time, gyro and others were expected")
-        chosen, others = _chosen(path, stored, units)
+        chosen, others = _chosen(path, "mat", stored, units)
         vectors, findings = choose_vectors(path.name, chosen.columns)
         findings += others
         source = f"{path.name}, facts"
@@ -141,8 +142,10 @@ def mat_blocks(
         yield from stored_blocks(stored, vectors, findings, None if stated is None else facts, rows, columns)
 
 
-def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> tuple[Group, tuple[Finding, ...]]:
-    """The variables at the top, or those of the only struct that holds a time and a gyro.
+def _chosen(
+    path: Path, kind: str, stored: StoredFile, units: Mapping[str, str]
+) -> tuple[Group, tuple[Finding, ...]]:
+    """The columns at the top, or those of the only struct or group that holds a time and a gyro.
 
     What others hold of a run is said: whether their clocks go with that one nobody can tell.
     """
@@ -162,13 +165,13 @@ def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> tuple[G
             "or read it by an import profile"
         )
     if not runs and len(groups) > 1:
-        raise unknown_fields(path, "mat", groups)
+        raise unknown_fields(path, kind, groups)
     chosen = (runs or groups)[0]
     others = [(group.name, name) for group in groups for name in group.names if group is not chosen]
     unread = [f"{of}/{name}" if of else name for of, name in others if name != "time" and column_spec(name)]
     if not unread:
         return chosen, ()
-    told = f"not read, as of other structs: {listed(map(quoted, unread))}; an import profile reads them"
+    told = f"not read, of other structs or groups: {listed(map(quoted, unread))}; a profile reads them"
     return chosen, (Finding("other_columns", told, count=len(unread)),)
 
 

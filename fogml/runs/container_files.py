@@ -63,9 +63,14 @@ class Group:
         return tuple(parse_header(cell)[0] for cell, _ in self.columns)
 
     @property
+    def is_timed(self) -> bool:
+        """Whether it holds a clock."""
+        return "time" in self.names
+
+    @property
     def is_run(self) -> bool:
         """Whether it holds a clock and a gyro."""
-        return "time" in self.names and any(n == "gyro" or n.startswith("gyro_") for n in self.names)
+        return self.is_timed and any(n == "gyro" or n.startswith("gyro_") for n in self.names)
 
     def column(self, name: str) -> tuple[str, StoredArray]:
         """Header cell and array of a column."""
@@ -81,13 +86,27 @@ def grouped(stored: StoredFile) -> dict[str, list[StoredArray]]:
 
 
 def groups_of(stored: StoredFile, kind: str) -> list[Group]:
-    """The groups of a file, in its order."""
+    """The groups of a file, in its order; what has no clock and is as long as one group's goes with that."""
     rotations = [array.name for array in stored.arrays if kind == "miniseed" and _ROTATION.search(array.name)]
-    return [
+    groups = [
         Group(
             name, tuple(zip(canonical_cells(_cells(kind, name, arrays, len(rotations))), arrays, strict=True))
         )
         for name, arrays in grouped(stored).items()
+    ]
+    clocks = {group.name: max(group.column("time")[1].shape, default=0) for group in groups if group.is_timed}
+    home = {group.name: group.name for group in groups}
+    for group in groups:
+        counts = {max(array.shape, default=0) for _, array in group.columns if vector_fault(array) is None}
+        alike = [name for name, count in clocks.items() if counts == {count}]
+        if not group.is_timed and len(alike) == 1:
+            home[group.name] = alike[0]
+    return [
+        replace(
+            group, columns=tuple(c for one in groups if home[one.name] == group.name for c in one.columns)
+        )
+        for group in groups
+        if home[group.name] == group.name
     ]
 
 
@@ -136,7 +155,7 @@ def container_blocks(
         joined = [
             (cell, group, array)
             for group in groups
-            if group is not main and "time" in group.names and group.name not in others
+            if group is not main and group.is_timed and group.name not in others
             for cell, array in group.columns
             if _is_joined(cell, main) and (columns is None or parse_header(cell)[0] in columns)
         ]
@@ -227,17 +246,18 @@ def container_columns(
         for source, array in found.items():
             if fault := vector_fault(array):
                 raise InputError(f"{path.name}, column {quoted(str(source))}: {fault}; name another")
-        names = [array.group for array in found.values()]
-        main = found[clock].group if clock is not None else max(names, key=names.count)
-        count = max(next(array for array in found.values() if array.group == main).shape)
+        home = {array.index: group.name for group in groups.values() for _, array in group.columns}
+        names = [home[array.index] for array in found.values()]
+        main = home[found[clock].index] if clock is not None else max(names, key=names.count)
+        count = max(next(array for array in found.values() if home[array.index] == main).shape)
         columns: dict[str | int, FloatArray] = {}
         findings = []
         for source, array in found.items():
             stored.limits.check_size(path, float(max(array.shape)))
             values = _read_long(stored, array)
-            if array.group != main:
-                at, own = (_clock_of(path, stored, groups[name]) for name in (main, array.group))
-                findings.append(next(_joined_findings([(array.name, groups[array.group], array)])))
+            if (group := home[array.index]) != main:
+                at, own = (_clock_of(path, stored, groups[name]) for name in (main, group))
+                findings.append(next(_joined_findings([(array.name, groups[group], array)])))
                 if source not in held:
                     findings += held_beyond(array.name, clock_ends(at), clock_ends(own), len(own))
                 values = interpolated(at, own, values, source in held)
@@ -280,7 +300,7 @@ def _clock_ends(path: Path, stored: StoredFile, group: Group, rows: int = 256) -
 
 def _clock_of(path: Path, stored: StoredFile, group: Group) -> FloatArray:
     """Times of a group's samples [s]."""
-    if "time" not in group.names:
+    if not group.is_timed:
         raise InputError(f"{path.name}: {quoted(group.name)} has no clock by which it could be joined")
     cell, array = group.column("time")
     return stored.read(array, 0, max(array.shape)) * clock_s(cell, path.name)
@@ -289,7 +309,7 @@ def _clock_of(path: Path, stored: StoredFile, group: Group) -> FloatArray:
 def unknown_fields(path: Path, kind: str, groups: Sequence[Group]) -> InputError:
     """What to say of a file in which no group holds a clock and a gyro: what it holds, and the way on."""
     label = reader_of(kind).label
-    fields = [f"{group.name}/{cell}" if group.name else cell for group in groups for cell, _ in group.columns]
+    fields = [f"{of}/{c}" if (of := a.group) else c for group in groups for c, a in group.columns]
     return InputError(
         f"{path.name}: a {label} file, and none of its groups has both 'time' and 'gyro' by name; it holds "
         f"{listed(fields, 40) or 'nothing'}. 'fogml import {printable(path.name)} --draft -o profile.yaml' "

@@ -60,14 +60,14 @@ def _of_container(path: Path, kind: str) -> tuple[list[str], list[Field]]:
         if not scores:
             raise InputError(f"{path.name}: holds no columns of numbers; a draft needs some")
         main = max(scores, key=lambda name: scores[name])
-        timed = [g.name for g in groups if "time" in g.names and parse_header(g.column("time")[0])[1]]
+        timed = [g.name for g in groups if g.is_timed and parse_header(g.column("time")[0])[1]]
         fields = []
         for group in groups:
             for cell, array in group.columns:
                 name, unit = parse_header(cell)
                 is_joined = {main, group.name} <= set(timed) and name != "time" and not group.is_run
                 if group.name == main or (is_joined and _WARM.search(name)):
-                    source = f"{group.name}/{array.name}" if group.name else array.name
+                    source = f"{array.group}/{array.name}" if array.group else array.name
                     sound = vector_fault(array) is None
                     held = stored.read(array, 0, min(max(array.shape), MOST_ROWS)) if sound else ()
                     fields.append(Field(source, name, unit, [repr(float(value)) for value in held]))
@@ -90,6 +90,9 @@ def _columns(fields: Sequence[Field]) -> list[str]:
         gyros = sorted(held, key=_unlike_a_gyro)[:1]
         left = [f for f in left if f not in gyros]
     axes = {m[1].lower(): f for f in gyros if (m := _AXIS.search(f.name))}
+    of_a_matrix = {m[1] for f in gyros if (m := re.fullmatch(r"(.*) column [123]", f.name))}
+    in_order = "" if axes or len(gyros) != 3 or len(of_a_matrix) != 1 else f"    {_MARK}in this order?"
+    axes = dict(zip("xyz", gyros, strict=True)) if in_order else axes
     many = len(gyros) > 1 and len(axes) == len(gyros)
     lines.append("  gyro: " + _gyro(gyros[0] if gyros else None, many))
     used: set[str] = set()
@@ -101,7 +104,9 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     if len(lines) == warm_before and (rest := sorted((f for f in left if f not in gyros), key=_takes_few)):
         lines.append(f"  # T: {{source: {as_yaml(rest[0].source)}, unit: degC}}    # a drift model needs one")
     if many:
-        lines.append("axes: {" + ", ".join(f"{axis}: {as_yaml(f.source)}" for axis, f in axes.items()) + "}")
+        lines.append(
+            "axes: {" + ", ".join(f"{axis}: {as_yaml(f.source)}" for axis, f in axes.items()) + "}" + in_order
+        )
     if not any(line.startswith("  time:") for line in lines):
         held = [f for f in left if f.first and (f.name == "time" or _TIME.search(f.name))]
         unread = f" ({quoted(held[0].first[0].strip())} is no date that is read)" if held else ""

@@ -338,15 +338,15 @@ def test_a_block_of_many_columns_has_fewer_rows(tmp_path, monkeypatch):
 
 
 def test_a_long_variable_of_matlab_is_put_away(tmp_path, monkeypatch):
-    from fogml.readers import stored
+    from fogml.readers import matlab
 
-    monkeypatch.setattr(stored, "_LONG_BYTES", 100)
+    monkeypatch.setattr(matlab, "_LONG_BYTES", 100)
     for layout in (np.ascontiguousarray, np.asfortranarray):
         matrix = layout(np.c_[TIME, GYRO])
         (tmp_path / "log.mat").unlink(missing_ok=True)
         savemat(tmp_path / "log.mat", {"log": {"time_s": TIME, "both": matrix}, "gyro_dph": GYRO, "n": "x"})
-        held = stored.Mat.loaded(str(tmp_path / "log.mat"))
-        assert isinstance(held["log"]["both"], stored.PutAway) and held["n"] == "x"
+        held = matlab.Mat.loaded(str(tmp_path / "log.mat"))
+        assert isinstance(held["log"]["both"], matlab.PutAway) and held["n"] == "x"
         np.testing.assert_array_equal(held["log"]["both"][10:20, 1], GYRO[10:20])
         np.testing.assert_array_equal(held["gyro_dph"][:], GYRO)
 
