@@ -12,6 +12,7 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.runs.settling import LEAST_ROWS, error_of_mean, settling_rows
+from fogml.runs.transitions import LONGEST_TRANSITION_S
 from fogml.runs.turning import white_noise
 
 SETTLING_ROWS = 2
@@ -106,7 +107,8 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
         turning[wave.start : wave.stop] = True
     changes = (np.abs(np.diff(rate)) > _NOISES * white_noise(rate[~turning])) | turning[1:] | turning[:-1]
     steps = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(rate)]]).astype(np.intp)
-    settling, leaving = _unsettled(output, rate, steps) if settle_s is None else (0, 0)
+    reach = max(round(2.0 * LONGEST_TRANSITION_S / run.sample_s), 4 * LEAST_ROWS)
+    settling, leaving = _unsettled(output, rate, steps, reach) if settle_s is None else (0, 0)
     rows = []
     for start, stop in zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True):
         settled, left, most = start, stop, max(SETTLING_ROWS, (stop - start) // 2)
@@ -115,7 +117,7 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
         elif start:
             settled = start + min(settling, most)
         if stop < len(rate):
-            left = stop - min(leaving, most)
+            left = max(stop - min(leaving, most), min(settled + LEAST_ROWS, stop))
         parts = [start, *_long_gaps(run, start, stop), stop]
         for first, last in pairwise(parts):
             begin, end = max(first, settled), min(last, left)
@@ -128,11 +130,12 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
     return Plateaus(start, stop, *values)
 
 
-def _unsettled(output: FloatArray, rate: FloatArray, steps: IndexArray) -> tuple[int, int]:
+def _unsettled(output: FloatArray, rate: FloatArray, steps: IndexArray, reach: int) -> tuple[int, int]:
     """Rows at the begin of plateaus in which gyro and table have not settled, and at the end in which they
     have left, as where the recorded rate comes late; by all plateaus between `steps` together.
 
-    Either is told by plateaus without the other, which the begin is looked into twice for.
+    Either is told by plateaus without the other, which the begin is looked into twice for; how they end, by
+    their last rows, `reach` of them at most.
     """
     first, last, count = steps[:-1], steps[1:], len(output)
     rise = 3600.0 * (rate[first[1:]] - rate[first[1:] - 1])
@@ -143,7 +146,9 @@ def _unsettled(output: FloatArray, rate: FloatArray, steps: IndexArray) -> tuple
         kept = np.append(last[:-1] - leaving, last[-1])[1:]
         settling = settling_rows(output, first[1:][begins], kept[begins], rise[begins], SETTLING_ROWS)
         kept = count - (np.append(0, first[1:] + settling))[:-1]
-        leaving = settling_rows(output[::-1], count - last[:-1][ends], kept[ends], -rise[ends], 0)
+        ended = count - last[:-1]
+        kept = np.minimum(kept, ended + reach)
+        leaving = settling_rows(output[::-1], ended[ends], kept[ends], -rise[ends], 0)
     return settling, leaving
 
 
