@@ -184,7 +184,7 @@ def joined_columns(path: Path, log: JoinedLog, stamps: Stamps | None) -> Mapping
     Raises
     ------
     InputError
-        If it is missing or does not fit.
+        If it is missing or does not fit, or one of the two states the zone of its stamps and the other none.
     """
     beside = path.parent / log.file.replace("{stem}", plain_path(path).stem)
     if not beside.is_file():
@@ -200,6 +200,13 @@ def joined_columns(path: Path, log: JoinedLog, stamps: Stamps | None) -> Mapping
     if table.seconds is not None:
         apart = 0.0
         if stamps is not None and table.stamps is not None:
+            if stamps.zoned != table.stamps.zoned and "offset_s" not in log.model_fields_set:
+                with_zone, without = (path, beside) if stamps.zoned else (beside, path)
+                raise InputError(
+                    f"{beside.name}: stamps of {with_zone.name} state their zone and those of {without.name} "
+                    "none; write 'offset_s' under 'join' in the profile: 0 where they are UTC, else what is "
+                    "added to the joined log's clock, as -3600 for one that shows Central European Time"
+                )
             apart = (table.stamps.first_ns - stamps.first_ns) / 1e9
         columns["time"] = table.seconds + apart
     columns["time"] = columns["time"] + log.offset_s

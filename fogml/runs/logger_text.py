@@ -312,7 +312,7 @@ class _Reader:
         columns = [texts[place].tolist() for place in places]
         columns = [stamps_of_parts(columns)] if len(columns) == PARTS else columns
         if self.clock is None:
-            stamps = stamps_of([(i, column[:1000]) for i, column in enumerate(columns)])
+            stamps = stamps_of(list(enumerate(columns)), self.profile.reject.not_numbers)
             if stamps is None:
                 first = " ".join(str(texts[place][0]) for place in places if len(texts[place]))
                 named = listed([quoted(str(p)) for p in places])

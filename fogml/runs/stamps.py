@@ -200,10 +200,21 @@ def stamp_form(texts: Sequence[str]) -> StampForm | None:
     return StampForm(kind, "?")
 
 
-def stamps_of(columns: Sequence[tuple[int, Sequence[str]]]) -> Stamps | None:
-    """The clock of columns, given by position with their first texts; None where these are no stamps."""
+_FIRST_ROWS = 1000  # of which a clock's form is told
+
+
+def stamps_of(columns: Sequence[tuple[int, Sequence[str]]], skip: bool = False) -> Stamps | None:
+    """The clock of columns, given by position with their first texts; None where these are no stamps.
+
+    With `skip` rows above the first of stamps, such as one of units, are left out.
+    """
     import pyarrow as arrow
 
+    columns = [(place, texts[:_FIRST_ROWS]) for place, texts in columns]
+    if skip:
+        rows = enumerate(zip(*(texts for _, texts in columns)))
+        begin = next((i for i, row in rows if all(stamp_form([text]) for text in row)), 0)
+        columns = [(place, texts[begin:]) for place, texts in columns]
     forms = [(place, stamp_form(texts)) for place, texts in columns]
     known = tuple((place, form) for place, form in forms if form is not None)
     dates = sum("date" in form.kind for _, form in known)

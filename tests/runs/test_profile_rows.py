@@ -9,6 +9,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.runs.logger_text import read_logger_text
+from fogml.runs.profile_draft import draft_profile
 from fogml.runs.profiles import import_recording, load_profile
 from fogml.runs.reading import read_run
 from tests.readers import files
@@ -334,3 +335,43 @@ def test_a_leg_was_switched_on_with_its_recording(read, clock):
         "legs: {a: [0, 10], b: [10, 40]}\nfacts: {powered_on: -5.0}\n"
     )
     assert [run.facts.powered_on for run in read(profile, text)] == [-5.0, -15.0]
+
+
+def of_bench(path, name, rows):
+    (path / name).write_text("\n".join(rows) + "\n")
+
+
+@pytest.mark.parametrize("units", ["dd.mm.yyyy,hh:mm:ss,deg/h,°C", ",,deg/h,°C"])
+def test_a_row_of_units_above_dates_is_left_out(tmp_path, units):
+    rows = [f"2026-03-13,08:00:{i:02d},{9.5 + i},{20.5 + i}" for i in range(40)]
+    of_bench(tmp_path, "log.csv", ["Bench 3,,,", "Date,Time,Gyro,Oven", units, *rows])
+    (tmp_path / "profile.yaml").write_text(draft_profile(tmp_path / "log.csv"))
+    (run,) = import_recording(tmp_path / "log.csv", tmp_path / "profile.yaml")
+    np.testing.assert_allclose(run.time, np.arange(40), atol=1e-9)
+    np.testing.assert_allclose(run.gyro, 9.5 + np.arange(40))
+    np.testing.assert_allclose(run.columns["T"], 20.5 + np.arange(40))
+    assert str(run.facts.started).startswith("2026-03-13 08:00:00")
+
+
+def test_a_joined_log_in_local_time_is_no_hour_late(tmp_path):
+    """An oven that shows Central European Time beside a gyro in UTC, by its temperature in each minute."""
+    gyro = [f"2026-03-13T07:{i // 60:02d}:{i % 60:02d}Z,{9.5 + i}" for i in range(600)]
+    of_bench(tmp_path, "run.csv", ["When,Gyro [deg/h]", *gyro])
+    oven = [f"2026-03-13 {6 + i // 60:02d}:{i % 60:02d}:00,{i}" for i in range(240)]
+    of_bench(tmp_path, "run-oven.csv", ["When,Oven", *oven])
+    profile = """schema: fogml.import/1
+description: bench
+separator: comma
+columns: {time: {source: When, unit: stamp}, gyro: {source: "Gyro [deg/h]", unit: deg/h}}
+join:
+  - file: "{stem}-oven.csv"
+    separator: comma
+    columns: {time: {source: When, unit: stamp}, T_chamber: {source: Oven, unit: degC}}
+"""
+    (tmp_path / "profile.yaml").write_text(profile)
+    with pytest.raises(InputError, match=r"run-oven.csv: stamps of run.csv state their zone and those of"):
+        import_recording(tmp_path / "run.csv", tmp_path / "profile.yaml")
+    (tmp_path / "profile.yaml").write_text(profile + "    offset_s: -3600\n")
+    (run,) = import_recording(tmp_path / "run.csv", tmp_path / "profile.yaml")
+    # At 07:00 UTC the oven's clock shows 08:00, two hours after its log began.
+    np.testing.assert_allclose(run.columns["T_chamber"], 120.0 + np.arange(600) / 60.0, atol=1e-9)
