@@ -391,3 +391,16 @@ def test_a_rate_that_is_recorded_late_or_early_moves_no_scale_factor(late):
     assert line["scale_factor"] == pytest.approx(1.0 + 80e-6, abs=0.3e-6)
     assert line["ci90"][0] < 1.0 + 80e-6 < line["ci90"][1]
     assert line["nonlinearity_ppm"] < 0.5
+
+
+def test_a_bias_that_bends_over_a_long_rest_takes_no_plateau_away():
+    """What an hour's line misses at its end looked like a rate that is recorded late."""
+    rate = np.append(np.concatenate([np.zeros(3600), np.repeat([10.0, -10.0], 60)] * 3), np.zeros(60))
+    time = np.arange(float(len(rate)))
+    bias = np.exp(-(time % 3720.0) / 200.0)
+    noise = 0.3 * np.random.default_rng(1).standard_normal(len(rate))
+    gyro = 3600.0 * rate * (1.0 + 50e-6) + bias + noise
+    run = Run.from_columns("soaks", Facts(), time=time, gyro=gyro, rate=rate)
+    assert len(find_plateaus(run)) == 10
+    line = rate_json([run], source="")["scale_factor"]
+    assert line["scale_factor"] == pytest.approx(1.0 + 50e-6, abs=5e-6)
