@@ -14,6 +14,7 @@ from fogml.readers.stored import Refused, text_of
 _BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
 _BATCH_ROWS = 1 << 16
 _LONGEST_MARK = 100
+_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 class Parquet:
@@ -66,8 +67,9 @@ class ParquetColumn:
         self.shape = (file.metadata.num_rows,)
         kinds = (types.is_floating, types.is_integer, types.is_boolean, types.is_decimal, types.is_null)
         self.is_stamp = types.is_timestamp(held)
-        kind = "f" if self.is_stamp or any(is_kind(held) for is_kind in kinds) else "O"
-        unit = "s" if self.is_stamp else None
+        self.is_span = types.is_duration(held) or types.is_time(held)
+        kind = "f" if self.is_stamp or self.is_span or any(is_kind(held) for is_kind in kinds) else "O"
+        unit = "s" if self.is_stamp or self.is_span else None
         self.told = {"name": self.name[:1000], "unit": unit, "fault": None, "kind": kind}
         self.told |= {"type": str(held)[:60], "shape": list(self.shape)}
         self.at, self.ahead, self.batches = 0, None, iter(())
@@ -103,6 +105,11 @@ class ParquetColumn:
                 since = values_of(nanoseconds(piece).fill_null(self.first_ns))
                 held = np.where(values_of(piece.is_null()), np.nan, since - self.first_ns)
                 yield held / 1e9
+            elif self.is_span:
+                yield (
+                    values_of(piece.cast(f"int{piece.type.bit_width}").cast("float64", safe=False))
+                    * _UNITS_S[piece.type.unit]
+                )
             else:
                 # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
                 yield values_of(piece.cast("float64", safe=False))

@@ -242,7 +242,8 @@ def parquet_blocks(
                 vectors.append((stated_cell(array.name, array.unit), array))
             elif column_spec(name) is not None:
                 raise InputError(
-                    f"{path.name}, column '{name}': holds {array.type_name}, numbers were expected"
+                    f"{path.name}, column '{name}': holds {array.type_name}, numbers were expected; write it "
+                    "with numbers or timestamps, a column for each axis"
                 )
             else:
                 findings.append(text_column(name))

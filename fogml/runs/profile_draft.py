@@ -101,6 +101,11 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     faces = [face_of(one.name) for one in of_a_run]
     for one, face in zip(of_a_run, faces if "T_in" in faces else [None] * len(faces), strict=True):
         lines.append(_other(one, face, used))
+        if beside := [f for f in left if f.name == "time" and _is_left_of(f, one)]:
+            doubt = (
+                f"by the clock of column {beside[-1].source}? then write it as a file of its own and join it"
+            )
+            lines[-1] += f"; {doubt}" if _MARK in lines[-1] else f"    {_MARK}{doubt}"
     if len(lines) == warm_before and (rest := sorted((f for f in left if f not in gyros), key=_takes_few)):
         lines.append(f"  # T: {{source: {as_yaml(rest[0].source)}, unit: degC}}    # a drift model needs one")
     if many:
@@ -123,6 +128,12 @@ def _columns(fields: Sequence[Field]) -> list[str]:
         "# legs: {up: {from_s: 0, to_s: 3600}}        # runs of their own",
     ]
     return lines
+
+
+def _is_left_of(one: Field, other: Field) -> bool:
+    """Whether a column stands before another one, where they are told by their places."""
+    places = one.source, other.source
+    return isinstance(places[0], int) and isinstance(places[1], int) and places[0] < places[1]
 
 
 def _unlike_a_gyro(one: Field) -> tuple[bool, bool, bool, int]:

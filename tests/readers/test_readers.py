@@ -248,6 +248,23 @@ def test_readers_have_names_of_their_own():
     assert all(reader_of(reader.name) is reader for reader in READERS)
 
 
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+def test_durations_and_times_of_day_in_parquet(tmp_path, unit):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    steps = np.arange(COUNT) * {"s": 1, "ms": 250, "us": 250_000, "ns": 250_000_000}[unit]
+    seconds = steps * {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[unit]
+    of_day = pa.time32(unit) if unit in ("s", "ms") else pa.time64(unit)
+    for kind in (pa.duration(unit), of_day):
+        whole = pa.array(steps, pa.int32() if kind == of_day and unit in ("s", "ms") else pa.int64())
+        table = pa.table({"time": whole.cast(kind), "gyro [deg/h]": GYRO, "T [degC]": WARM})
+        parquet.write_table(table, tmp_path / "log.parquet")
+        run = read_run(tmp_path / "log.parquet")
+        np.testing.assert_allclose(run.time, seconds, atol=1e-9)
+        np.testing.assert_array_equal(run.gyro, GYRO)
+
+
 @pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
 def test_timestamps_of_pandas_in_parquet(tmp_path, zone):
     import pandas as pd

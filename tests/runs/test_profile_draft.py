@@ -430,6 +430,16 @@ def test_stamps_of_a_terminal_before_each_line_are_its_clock(tmp_path, line, mar
     np.testing.assert_allclose(run.time, np.arange(COUNT), atol=1e-9)
 
 
+def test_a_thermometer_behind_a_clock_of_its_own_is_a_guess(tmp_path):
+    """Two logs side by side in one worksheet: by the gyro's clock its ramp would be ten times too fast."""
+    slow = [f"{10.0 * i},{20.5 + i}" if i < COUNT // 10 else "," for i in range(COUNT)]
+    rows = [f"{i},{9.5 + i % 7},,{right}" for i, right in enumerate(slow)]
+    header = "time [s],gyro [deg/h],,time [s],T [degC]"
+    (tmp_path / "log.csv").write_text("\n".join([header, *rows, ""]))
+    (line,) = (text for text in draft_profile(tmp_path / "log.csv").splitlines() if text.startswith("  T:"))
+    assert "source: 4" in line and "# GUESS: by the clock of column 3?" in line and "join" in line
+
+
 @pytest.mark.parametrize("after", [" AM", " UTC", " +02:00"])
 def test_what_ends_a_date_is_no_text_of_a_device(tmp_path, after):
     rows = [f"2026-03-11 10:15:{i:02d}{after},{9.5 + i},{20.5 + 0.1 * i}" for i in range(COUNT)]
