@@ -177,7 +177,9 @@ class LineReader:
         if len(fields) < width or any(text.strip() for text in fields[width:]):
             kind = "cut short" if len(fields) < width else "too long"
             is_split = dialect.separator == "," and any(text.strip().isdigit() for text in fields[width:])
-            hint = "; is the comma a decimal mark too? Export it with semicolons between" if is_split else ""
+            hint = "; has a column no name? Write one in the header"
+            hint += "; is the comma a decimal mark too? Export it with semicolons between" if is_split else ""
+            hint = "" if len(fields) < width else hint
             held = counted(len(fields), "field")
             raise _Fault(f"line {line}: {held} where the header has {width} (row {kind}){hint}")
         for place, form in dialect.stamps.columns if dialect.stamps else ():

@@ -220,7 +220,12 @@ def _clock(run: Run, names: Sequence[str]) -> Iterator[Finding]:
     for name in names:
         # Readings that are none, such as -9999, are few in each part.
         medians = np.array([np.median(run.columns[name][a:b]) for a, b in spans])
-        moved, within_s = np.abs(np.diff(medians)), np.diff(middle)
+        # Stretches of such tell no temperature either.
+        held = (medians > COLDEST_DEGC) & (medians < HOTTEST_DEGC)
+        if not held.any():
+            continue
+        medians = medians[held]
+        moved, within_s = np.abs(np.diff(medians)), np.diff(middle[held])
         fast = moved > FASTEST_DEGC_PER_MIN / 60.0 * within_s
         if moved[fast].sum() >= FAR_DEGC:
             told = (

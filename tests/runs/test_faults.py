@@ -43,7 +43,10 @@ FAULTS = {
     "text": (spoiled("30.0,1.25,warm"), ["'T'", "line 32", "'warm'"]),
     "a number with text": (spoiled("30.0,1_000,20.5"), ["'gyro'", "line 32", "'1_000'"]),
     "cut short": (spoiled("30.0,1.25"), ["line 32", "cut short", "2 fields"]),
-    "too long": (spoiled("30.0,1.25,20.5,7"), ["line 32", "4 fields"]),
+    "too long": (
+        spoiled("30.0,1.25,20.5,7"),
+        ["line 32", "4 fields", "has a column no name?", "decimal mark"],
+    ),
     "the last line cut short": (text_of(*ROWS)[:-7], ["line 41"]),
     "the last number cut": (text_of(*ROWS)[:-3], ["last line", "middle of a number"]),
     "header only": (HEADER + "\n", ["no samples"]),

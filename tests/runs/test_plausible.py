@@ -51,6 +51,10 @@ GIVEN_AWAY = {
         {"T_in": np.where(np.arange(ROWS) % 300 == 0, -9999.0, SOUND["T_in"])},
         {"temperature_dropouts"},
     ),
+    "a stretch of readings that are none": (
+        {"T_in": np.where(np.arange(ROWS) // 200 == 3, -32768.0, SOUND["T_in"])},
+        {"temperature_dropouts"},
+    ),
     "hours stated as s": ({"time": SOUND["time"] / 3600.0}, {"implausible_clock"}),
     "s stated as ms": ({"time": SOUND["time"] / 1000.0}, {"implausible_clock"}),
     "days of a spreadsheet": ({"time": 45000.0 + SOUND["time"] / 86400.0}, {"implausible_clock"}),
