@@ -28,7 +28,15 @@ from pydantic import Field, with_config
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.folds import Fold, run_folds, time_folds
-from fogml.models.table import Compose, RunRows, TrainingTable, averaged_table, longest_interval_s, recorded_s
+from fogml.models.table import (
+    Compose,
+    RunRows,
+    TrainingTable,
+    averaged_table,
+    averaging_of,
+    longest_interval_s,
+    recorded_s,
+)
 from fogml.models.unseen_noise import unseen_noises
 from fogml.signals.averages import AVERAGING_S
 from fogml.signals.distributions import normal_ppf, student_ppf
@@ -158,8 +166,8 @@ def interval_table(rows: Sequence[RunRows], compose: Compose = lambda atoms: ato
     box of the others, as in use; within 100 s the temperature hardly bends. `compose` makes what else is
     to be averaged of atoms, shape (n, a).
     """
-    averaging_s = max(min(AVERAGING_S, recorded_s(rows) / _LEAST_AVERAGES), longest_interval_s(rows))
-    return averaged_table(rows, compose, averaging_s)
+    least_s = max(min(AVERAGING_S, recorded_s(rows) / _LEAST_AVERAGES), longest_interval_s(rows))
+    return averaged_table(rows, compose, averaging_of(rows, least_s))
 
 
 def interval_folds(table: TrainingTable, guard_s: float = 0.0) -> tuple[list[Fold], str]:

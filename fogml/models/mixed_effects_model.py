@@ -28,7 +28,7 @@ from fogml.models.intervals import Intervals, of_usual_averages
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import fit_mixed_effects
 from fogml.models.size_priors import SizePriors
-from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
+from fogml.models.table import RunRows, TrainingTable, averaged_table, averaging_of, recorded_s, row_count
 from fogml.models.weights import intervals_of, shifts_apart, weights_of
 from fogml.numerals import percent, short
 from fogml.processes import one_thread
@@ -133,7 +133,7 @@ class MixedEffectsModel(FeatureModel):
 
 def averages_of(rows: Sequence[RunRows]) -> TrainingTable:
     """Averages of atoms and output, at most about `AVERAGES` of them."""
-    averaging_s = recorded_s(rows) / AVERAGES if row_count(rows) > AVERAGES else 0.0
+    averaging_s = averaging_of(rows, recorded_s(rows) / AVERAGES) if row_count(rows) > AVERAGES else 0.0
     return averaged_table(rows, lambda atoms: atoms, averaging_s)
 
 

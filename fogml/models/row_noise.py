@@ -14,7 +14,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.models.linear import LinearRegressor
-from fogml.models.table import Compose, RunRows, TrainingTable, averaged_table, recorded_s
+from fogml.models.table import Compose, RunRows, TrainingTable, averaged_table, averaging_of, recorded_s
 from fogml.processes import one_thread
 from fogml.signals.noise_model import NoiseModel, flicker_ladder
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
@@ -218,7 +218,8 @@ def noise_covariance(
     `fogml.signals.random_noise.LONGEST_S`.
     """
     if averaging_s is None:
-        averaging_s = 0.0 if sum(len(part.y) for part in rows) <= ROWS else recorded_s(rows) / ROWS
+        few = sum(len(part.y) for part in rows) <= ROWS
+        averaging_s = 0.0 if few else averaging_of(rows, recorded_s(rows) / ROWS)
     table = averaged_table(rows, compose, averaging_s)
     # Products of some hundred rows: threads within BLAS would only wait for each other.
     with one_thread("blas"):

@@ -194,7 +194,7 @@ def table_of_rows(rows: Sequence[RunRows], compose: Compose, max_rows: int | Non
     count = row_count(rows)
     averaging_s = 0.0
     if max_rows is not None and count > max_rows:
-        averaging_s = recorded_s(rows) / max_rows
+        averaging_s = averaging_of(rows, recorded_s(rows) / max_rows)
     return averaged_table(rows, compose, averaging_s)
 
 
@@ -239,6 +239,22 @@ def row_count(rows: Sequence[RunRows]) -> int:
 def recorded_s(rows: Sequence[RunRows]) -> float:
     """Time that the rows stand for [s]: their number times the median interval, run by run."""
     return float(sum(len(part.y) * part.interval_s for part in rows))
+
+
+def averaging_of(rows: Sequence[RunRows], least_s: float) -> float:
+    """An averaging time of at least `least_s` whose averages hold most rows [s]; longer for bursts of rows.
+
+    An average is dropped where its window is less than half full, as between the length of a burst and that
+    of the gaps between bursts.
+    """
+    count, averaging_s = sum(len(part.y) for part in rows), least_s
+    longest_s = max((float(np.ptp(part.time_s)) for part in rows if len(part.y)), default=0.0)
+    while averaging_s < longest_s:
+        means = [block_averages(part.time_s, window_s=averaging_s) for part in rows]
+        if 2 * sum(int(each.counts.sum()) for each in means) >= count:
+            return averaging_s
+        averaging_s *= 2.0
+    return least_s
 
 
 def longest_interval_s(rows: Sequence[RunRows]) -> float:

@@ -25,7 +25,7 @@ from fogml.models.regressors import (
     parameter_count,
     predict_rows,
 )
-from fogml.models.table import RunRows, TrainingTable, recorded_s, row_count, run_rows
+from fogml.models.table import RunRows, TrainingTable, averaging_of, recorded_s, row_count, run_rows
 from fogml.models.weights import shift_share
 from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
@@ -232,7 +232,7 @@ def averaged_rows(rows: Sequence[RunRows]) -> list[RunRows]:
     """Rows averaged over time down to `SCORED_ROWS` in all; as they are where there are fewer."""
     if sum(len(part.y) for part in rows) <= SCORED_ROWS:
         return list(rows)
-    window_s = recorded_s(rows) / SCORED_ROWS
+    window_s = averaging_of(rows, recorded_s(rows) / SCORED_ROWS)
     averaged = []
     for part in rows:
         means = block_averages(part.time_s, part.atoms, part.y, window_s=window_s)

@@ -27,6 +27,7 @@ from fogml.models.generalised_least_squares import RunsNoise, beside_constants, 
 from fogml.models.table import (
     TrainingTable,
     averaged_table,
+    averaging_of,
     longest_interval_s,
     recorded_s,
     run_rows,
@@ -128,7 +129,7 @@ def lag_of(runs: Sequence[Run], rows: int = Asked.rows, steps: int = 12) -> Lag 
     """
     try:
         parts = [run_rows(run, parse_features("T")) for run in runs]
-        averaging_s = max(recorded_s(parts) / rows, longest_interval_s(parts))
+        averaging_s = averaging_of(parts, max(recorded_s(parts) / rows, longest_interval_s(parts)))
         table = averaged_table(parts, lambda atoms: atoms, averaging_s)
     except (InputError, ValueError):
         return None

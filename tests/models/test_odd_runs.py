@@ -11,6 +11,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.names import MODEL_NAMES, make_model
 from fogml.models.saved import load_model, save_model
+from fogml.models.table import RunRows, averaging_of
 from fogml.report.compare_page import compare_page
 from fogml.report.train_page import train_page
 from fogml.runs.facts import Facts
@@ -124,3 +125,26 @@ def test_a_run_is_given_once(name: str) -> None:
     for twice in (first, later):
         with pytest.raises(InputError, match=r"the same samples as a\.csv; give each run once"):
             make_model(name).fit([first, second, twice])
+
+
+@pytest.mark.parametrize("name", ["auto", "rbf", "polynomial"])
+def test_a_logger_that_wakes_for_a_second_in_four_is_trained_on(name: str) -> None:
+    """Averages as short as so short a run allows are less than half full there: none was left to judge by."""
+    time = np.arange(0.0, 1800.0, 0.1)
+    time = time[time % 4.0 < 1.0 - 1e-9]
+    temperature = 30.0 - 15.0 * np.cos(2.0 * np.pi * time / 900.0)
+    gyro = 10.0 + 0.1 * temperature + np.random.default_rng(0).normal(0.0, 0.1, len(time))
+    run = Run.from_columns("bursts", None, time=time, gyro=gyro, T_in=temperature)
+    model = make_model(name).fit([run])
+    told = model.evaluate(run).drift
+    assert np.std(told - 0.1 * temperature) < 0.05
+    assert 0.0 < model.intervals_.half_width(0.9) < 1.0
+
+
+def test_averages_are_longer_for_bursts_alone() -> None:
+    time = np.arange(0.0, 3600.0, 0.5)
+    even = RunRows(np.zeros((len(time), 1)), np.zeros(len(time)), time)
+    assert averaging_of([even], 7.5) == 7.5
+    bursts = time[time % 20.0 < 5.0]
+    held = averaging_of([RunRows(np.zeros((len(bursts), 1)), np.zeros(len(bursts)), bursts)], 15.0)
+    assert 4.0 * 15.0 <= held <= 8.0 * 15.0

@@ -101,9 +101,10 @@ def _alike_in_blocks(
     """
     window = interval * int(np.ceil(len(clock) / rows))
     blocks = block_averages(clock, inputs, target, window_s=window)
+    if len(blocks) < rows / 4:
+        return None
     between = blocks.values[0].var(axis=0)
-    alike = len(blocks) >= rows / 4 and np.all(spread - between <= _MIXED * spread + 1e-12)
-    return blocks if alike else None
+    return blocks if np.all(spread - between <= _MIXED * spread + 1e-12) else None
 
 
 def _one_clock(count: int, groups: ArrayLike | None, time: ArrayLike | None) -> FloatArray:
