@@ -169,6 +169,11 @@ class Container:
             }
         )
 
+    def refuse(self, name: str, fault: str) -> None:
+        """Tell of a column at the top why it is not read."""
+        self.add("", name, None, np.empty(0))
+        self.described[-1] |= {"fault": fault, "kind": "O"}
+
     @property
     def spool(self) -> Spool:
         """Where tables are kept that are unpacked as they are read."""

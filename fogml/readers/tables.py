@@ -74,6 +74,10 @@ class Npz(Container):
                 for column in names:
                     self.add_rows(name, column, None, rows, column)
 
+        elif (kind.hasobject or kind.kind in "SU") and np.prod(shape) > 1:
+            what = "objects, which may run what they hold" if kind.hasobject else "texts"
+            self.refuse(name, f"holds {what}; save it as float64 or datetime64")
+
     def rows(self, file: Any, kind: np.dtype[Any], count: int) -> Rows:
         """A table of what a file holds from here on, so many rows."""
         rows = Rows(self.spool, kind)
@@ -245,12 +249,8 @@ class Tdms(Container):
         begin = 0.0 if start is None or self.origin_s is None else start - self.origin_s
         if kind == "M" and count:
             first = channel[0]
-            self.add(
-                group,
-                channel.name,
-                "s",
-                Column(count, lambda a, b: begin + (channel[a:b] - first) / np.timedelta64(1, "s")),
-            )
+            moments = Column(count, lambda a, b: begin + (channel[a:b] - first) / np.timedelta64(1, "s"))
+            self.add(group, channel.name, "s", moments)
         if kind not in "fiu" or not count:
             return
         increment = channel.properties.get("wf_increment")

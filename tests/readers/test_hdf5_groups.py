@@ -102,3 +102,12 @@ def test_vectors_of_two_dimensions_in_numpy_archives(tmp_path):
     run = read_run(tmp_path / "log.npz")
     np.testing.assert_array_equal(run.gyro, GYRO)
     np.testing.assert_array_equal(run.columns["T"], WARM)
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"), [(object, "objects, which may run what they hold"), (str, "texts")]
+)
+def test_objects_and_texts_of_numpy_archives_are_named(tmp_path, kind, what):
+    np.savez(tmp_path / "log.npz", **{"time": TIME.astype(kind), "gyro [deg/h]": GYRO})
+    with pytest.raises(InputError, match=f"column 'time': holds {what}; save it as float64 or datetime64"):
+        read_run(tmp_path / "log.npz")
