@@ -204,7 +204,7 @@ ToFloats = Callable[[Any], Sequence[float]]
 _NUMBER = (bool, int, float, np.number)
 _DEEPEST = 5
 """Levels of a message; those that ROS 2 ships have three, results of ROS 1 actions six."""
-_LONGEST_ARRAY = 16
+LONGEST_ARRAY = 16
 """Numbers of an array that are columns: vectors, and matrices up to 3 by 4; scans and images are longer."""
 _STAMPS = {("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec")}
 
@@ -217,7 +217,7 @@ def leaves(message: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str,
     if isinstance(message, _NUMBER):
         yield above, message, _one
     elif isinstance(message, list | tuple | np.ndarray):
-        if len(message) <= _LONGEST_ARRAY:
+        if len(message) <= LONGEST_ARRAY:
             if all(isinstance(item, _NUMBER) for item in message):
                 yield above, message, list
             else:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.readers.columns import MOST_COLUMNS
+from fogml.readers.columns import LONGEST_ARRAY, MOST_COLUMNS
 
 _PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
 MOST_NAMES = 10_000
@@ -159,13 +159,13 @@ class FieldColumn:
 
 
 def fields_of(group: str, name: str, array: Any) -> list[tuple[str, str, Any]]:
-    """Group, name and array of each column of a dataset: fields of a table, columns of a long matrix."""
+    """Group, name and array of each column of a dataset: fields of a table, columns of a narrow matrix."""
     if array.dtype.names and array.ndim == 1:
         kinds = {field: array.dtype[field] for field in array.dtype.names}
         held = [field for field, kind in kinds.items() if kind.kind in "fiub" and not kind.shape]
         return [(f"{group}/{name}" if group else name, field, FieldColumn(array, field)) for field in held]
-    is_square = array.ndim == 2 and array.shape[0] == array.shape[1]
-    return [(group, *column) for column in ([(name, array)] if is_square else columns_of(name, array))]
+    is_long = array.ndim == 2 and min(array.shape) <= min(max(array.shape) - 1, LONGEST_ARRAY)
+    return [(group, *column) for column in (columns_of(name, array) if is_long else [(name, array)])]
 
 
 class Scaled:

@@ -10,7 +10,9 @@ of the same group, as those of Parquet. With h5py::
         file["time [s]"], file["gyro [deg/h]"], file["T_in [degC]"] = time, gyro, temperature
         file.attrs["unit"], file.attrs["axis"], file.attrs["latitude"] = "FOG-0417", "x", 39.9
 
-HDF5 makes a group ``gyro [deg`` of that name with a dataset ``h]`` in it; it is read as it was meant.
+Of several groups the one that holds a time and a gyro is read; fields of a table are columns, and so are the
+columns of a narrow matrix. HDF5 makes a group ``gyro [deg`` of that name with a dataset ``h]`` in it; it is
+read as it was meant.
 
 In MATLAB files, versions 5 to 7.3, a vector is named as the column (``time``, ``gyro``, ``T_in``); its unit
 stands under the same name in a struct ``units``. Set-up facts stand as JSON text in ``facts``. In MATLAB::

@@ -68,6 +68,17 @@ def test_numbers_that_are_packed_as_netcdf_packs_them(tmp_path):
     np.testing.assert_allclose(run.columns["T"], WARM, atol=0.005 + 1e-9)
 
 
+def test_images_beside_a_run_are_left_out_and_told(tmp_path):
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        write(file, "time", TIME, "s")
+        write(file, "gyro", GYRO, "deg/h")
+        file["spectra"] = np.zeros((COUNT, 100))
+        file["square"] = np.eye(3)
+    run = read_run(tmp_path / "log.h5")
+    assert set(run.columns) == {"time", "gyro"}
+    assert {f.column for f in run.findings if f.code == "left_out"} == {"spectra", "square"}
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_matrix_of_three_gyros_is_drafted_as_axes(tmp_path, turned):
     matrix = np.c_[GYRO, GYRO + 1.0, GYRO + 2.0]
