@@ -81,9 +81,7 @@ def hdf5_blocks(
     with stored_file(path, "hdf5", (FACTS_KEY, *Facts.model_fields), limits) as stored:
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'")
-        chosen, others = _chosen(path, "hdf5", stored, {})
-        vectors, findings = choose_vectors(path.name, chosen.columns)
-        findings += others
+        vectors, findings = _chosen(path, "hdf5", stored, {})
         facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the attributes")
         yield from stored_blocks(stored, vectors, findings, facts, rows, columns)
 
@@ -136,9 +134,7 @@ def mat_blocks(
             raise InputError(f"{path.name}: 'units' must be a struct of texts, e.g. units.time = 's'")
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no numeric vectors; time, gyro and others were expected")
-        chosen, others = _chosen(path, "mat", stored, units)
-        vectors, findings = choose_vectors(path.name, chosen.columns)
-        findings += others
+        vectors, findings = _chosen(path, "mat", stored, units)
         source = f"{path.name}, facts"
         facts = facts_from_json(stated, source) if isinstance(stated, str) else facts_from(stated, source)
         yield from stored_blocks(stored, vectors, findings, None if stated is None else facts, rows, columns)
@@ -146,8 +142,8 @@ def mat_blocks(
 
 def _chosen(
     path: Path, kind: str, stored: StoredFile, units: Mapping[str, str]
-) -> tuple[Group, tuple[Finding, ...]]:
-    """The columns at the top, or those of the only struct or group that holds a time and a gyro.
+) -> tuple[list[tuple[str, StoredArray]], tuple[Finding, ...]]:
+    """Vectors of the columns at the top, or of the only struct or group that holds a time and a gyro.
 
     What others hold of a run is said: whether their clocks go with that one nobody can tell.
     """
@@ -171,10 +167,11 @@ def _chosen(
     chosen = (runs or groups)[0]
     others = [(group.name, name) for group in groups for name in group.names if group is not chosen]
     unread = [f"{of}/{name}" if of else name for of, name in others if name != "time" and column_spec(name)]
+    vectors, findings = choose_vectors(path.name, chosen.columns)
     if not unread:
-        return chosen, ()
+        return vectors, findings
     told = f"not read, of other structs or groups: {listed(map(quoted, unread))}; a profile reads them"
-    return chosen, (Finding("other_columns", told, count=len(unread)),)
+    return vectors, (*findings, Finding("other_columns", told, count=len(unread)))
 
 
 def write_mat(
