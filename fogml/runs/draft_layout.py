@@ -17,14 +17,13 @@ from fogml.runs.columns import parse_header
 from fogml.runs.csv_dialect import decoded_head
 from fogml.runs.csv_header import Header, fields_of, is_number_like, labview_header, with_cells_above
 from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
-from fogml.runs.header_spelling import canonical_cells, with_units_below
+from fogml.runs.header_spelling import canonical_cells, uncommented, with_units_below
 from fogml.runs.logger_lines import mark_of_line_stamps, stamp_apart
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.yaml_text import parse_yaml
 
 MOST_ROWS = 200
 _TAIL_BYTES = 1 << 12
-_COMMENT_MARKS = ("#", "%", "//", ";")
 
 
 @dataclass
@@ -118,7 +117,9 @@ class _Header:
             return cls(labview.line, list(zip(labview.cells, spelled)), is_by_place=True)
         split = [(i, _split(lines[i], mark)) for i in range(data) if lines[i].strip()]
         # A mark of comments between blanks is a field too many.
-        is_marked = [len(cells) == width + 1 and cells[0] in _COMMENT_MARKS for _, cells in split]
+        is_marked = [
+            len(cells) == width + 1 and (cells[0] == ";" or not uncommented(cells[0])) for _, cells in split
+        ]
         split = [(i, cells[marked:]) for (i, cells), marked in zip(split, is_marked, strict=True)]
         names = [(i, cells) for i, cells in split if len(cells) == width and _are_names(cells)]
         if not names:

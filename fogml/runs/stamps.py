@@ -13,6 +13,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.arrow_arrays import values_of
 from fogml.errors import InputError
+from fogml.runs.csv_source import number
 
 if TYPE_CHECKING:
     from pyarrow import Array
@@ -237,7 +238,8 @@ def stamps_of_parts(parts: Sequence[Sequence[str]]) -> list[str]:
 
     Empty where they are none, as of a month 13 or a part of a second before the last.
     """
-    numbers = np.array([[_number(text) for text in column] for column in parts])
+    # What is no number becomes NaN.
+    numbers = np.array([[number(text, ".") for text in column] for column in parts], dtype=np.float64)
     year, month, day, hour, minute, second = numbers
     low, high = np.array([[1900, 1, 1, 0, 0, 0], [2200, 12, 31, 23, 59, 60]], dtype=np.float64)[:, :, None]
     known = np.all((numbers >= low) & (numbers <= high), axis=0) & np.all(numbers[:5] % 1.0 == 0.0, axis=0)
@@ -247,13 +249,6 @@ def stamps_of_parts(parts: Sequence[Sequence[str]]) -> list[str]:
     of_day = np.where(known, np.rint(((hour * 60.0 + minute) * 60.0 + second) * _NS), 0.0).astype(np.int64)
     moments = days.astype("datetime64[ns]") + of_day.astype("timedelta64[ns]")
     return [str(text) if is_one else "" for text, is_one in zip(np.datetime_as_string(moments), known)]
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return np.nan
 
 
 def _whole(texts: Any) -> IntArray:
