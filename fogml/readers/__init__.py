@@ -12,10 +12,7 @@ from pathlib import Path
 
 from fogml.errors import install_words
 
-__all__ = ["READERS", "UNCALCULATED", "Reader", "plain_path", "reader_of", "reader_of_content"]
-
-UNCALCULATED = "uncalculated"
-"""Key by which a workbook is asked whether it has formulas without values."""
+__all__ = ["READERS", "Reader", "plain_path", "reader_of", "reader_of_content"]
 
 
 @dataclass(frozen=True)
@@ -64,7 +61,7 @@ READERS = (
     Reader("mat", "MATLAB", (".mat",), (b"MATLAB",), "fogml.readers.matlab:Mat", "scipy.io"),
     Reader("npz", "NumPy", (".npz",), (), f"{_TABLES}:Npz", "numpy"),
     Reader("workbook", "Excel or OpenDocument", (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
-           (b"\xd0\xcf\x11\xe0",), f"{_TABLES}:Workbook", "python_calamine", "xlsx", 2.0, 400.0),
+           (b"\xd0\xcf\x11\xe0",), "fogml.readers.workbooks:Workbook", "python_calamine", "xlsx", 2.0, 400.0),
     Reader("packed", "gzip, bzip2, xz, zstd or zip", (".gz", ".bz2", ".xz", ".zst", ".zip"),
            (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd"), "fogml.readers.packed:Packed", "numpy",
            cpu_s_per_mb=1.0),

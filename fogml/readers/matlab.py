@@ -24,8 +24,10 @@ from fogml.readers.stored import (
 
 _LONG_BYTES = 1 << 20  # of an array that is put away; a file of shorter ones takes little memory
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
-_USER_BLOCK = 512
-_RESERVED = ("units", "facts")
+USER_BLOCK = 512
+"""Bytes of MATLAB's own before what is HDF5 in a file of version 7.3."""
+RESERVED = ("units", "facts")
+"""Variables that are no columns."""
 
 
 class Mat:
@@ -33,8 +35,8 @@ class Mat:
 
     def __init__(self, path: str, keys: list[str]) -> None:
         with open(path, "rb") as file:
-            head = file.read(_USER_BLOCK + len(_HDF5_MAGIC))
-        is_hdf5 = head.startswith(_HDF5_MAGIC) or head[_USER_BLOCK:].startswith(_HDF5_MAGIC)
+            head = file.read(USER_BLOCK + len(_HDF5_MAGIC))
+        is_hdf5 = head.startswith(_HDF5_MAGIC) or head[USER_BLOCK:].startswith(_HDF5_MAGIC)
         self.opened = Hdf5File(path) if is_hdf5 else None
         variables = self.members(self.opened.file) if self.opened else self.loaded(path)
         run = variables.get("run")
@@ -58,7 +60,7 @@ class Mat:
         own = held.get("units")
         units = own if isinstance(own, dict) else {}
         held = apart(held)
-        names = [name for name in held if name not in _RESERVED]
+        names = [name for name in held if name not in RESERVED]
         plain = [name for name in names if not isinstance(held[name], dict)]
         yield [
             (above, column, units.get(name) and text_of(units[name]), array)

@@ -1,29 +1,16 @@
-"""Readers of tables and test-bench recordings: NumPy archives, worksheets, TDMS, MDF4."""
+"""Readers of tables and test-bench recordings: NumPy archives, TDMS, MDF4."""
 
 from __future__ import annotations
 
-import csv
-import io
-import re
 import zipfile
-from collections.abc import Iterable, Iterator, Sequence
-from datetime import date, datetime, time, timedelta
+from datetime import datetime
 from functools import partial
-from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
-from fogml.readers import UNCALCULATED
-from fogml.readers.columns import BLOCK_BYTES, MOST_COLUMNS, Column, Container, Rows, Spool
+from fogml.readers.columns import BLOCK_BYTES, MOST_COLUMNS, Column, Container, Rows
 
-_NO_VALUE = re.compile(
-    rb"<(?:\w+:)?c\b(?![^<>]*\bt=.str)[^<>]*>\s*<(?:\w+:)?f\b[^<>]*(?:/>|>[^<]*</(?:\w+:)?f>)"
-    rb"\s*(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</|</(?:\w+:)?c>)"
-)
-"""A cell of SpreadsheetML (ECMA-376, 18.3.1.4) with a formula and no value; type ``str`` has empty text."""
-_LONGEST_CELL = 1 << 14
-"""Bytes of such a cell: formulas have at most 8192 characters."""
 _UNIT_PROPERTIES = ("unit_string", "Unit", "unit", "NI_UnitDescription", "Units")
 
 
@@ -102,127 +89,6 @@ class _Limited:
 
 def _seconds_since(first: np.datetime64, moments: Any) -> Any:
     return (moments - first) / np.timedelta64(1, "s")
-
-
-def _with_midnights(rows: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
-    """Rows whose dates are midnights where the cell above or below is a date with a time of day."""
-    above: list[Any] = []
-    for row, below in pairwise(chain(map(list, rows), [[]])):
-        for place, value in enumerate(row):
-            beside = (other[place] for other in (above, below) if place < len(other))
-            if type(value) is date and any(isinstance(other, datetime) for other in beside):
-                row[place] = datetime.combine(value, time())
-        yield row
-        above = row
-
-
-class Sheet:
-    """A worksheet as the text of a CSV file."""
-
-    ndim = 1
-    dtype = np.dtype("S")
-
-    def __init__(self, spool: Spool, rows: Any) -> None:
-        self.content = Rows(spool, np.uint8)
-        self.is_empty = True
-        self.durations: set[int] = set()
-        self.switches: dict[int, int] = {}
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        for line, row in enumerate(_with_midnights(rows), start=1):
-            writer.writerow([_cell(value) for value in row])
-            self.durations.update(i for i, value in enumerate(row) if isinstance(value, timedelta))
-            self.switches = {
-                i: line for i, value in enumerate(row) if isinstance(value, bool)
-            } | self.switches
-            if text.tell() > BLOCK_BYTES:
-                self.flush(text)
-        self.flush(text)
-        self.shape = (self.content.count,)
-
-    def flush(self, text: io.StringIO) -> None:
-        """Put what was written so far away."""
-        part = text.getvalue()
-        self.is_empty = self.is_empty and not part.strip(",\n")
-        self.content += part.encode()
-        text.seek(0)
-        text.truncate()
-
-    def text(self, start: int, stop: int) -> Any:
-        """Bytes of the text from one place to another."""
-        return self.content.read(None, start, stop)
-
-
-class Workbook(Container):
-    """A workbook: the text of each worksheet that is not empty, under its name, those first that are shown.
-
-    Of the attribute `UNCALCULATED` alone it tells whether there are formulas without values, and no sheet.
-    """
-
-    def __init__(self, path: str, keys: list[str]) -> None:
-        from python_calamine import CalamineWorkbook, SheetVisibleEnum
-
-        super().__init__()
-        self.hidden: list[str] = []
-        self.durations: dict[str, list[int]] = {}
-        self.switches: dict[str, list[tuple[int, int]]] = {}
-        self.is_uncalculated = UNCALCULATED in keys and _is_uncalculated(path)
-        if UNCALCULATED in keys:
-            return
-        with CalamineWorkbook.from_path(path) as book:
-            self.hidden = [s.name for s in book.sheets_metadata if s.visible != SheetVisibleEnum.Visible]
-            for name in sorted(book.sheet_names, key=self.hidden.__contains__):
-                held = book.get_sheet_by_name(name)
-                # From the first row, as in the program that shows them, though nothing stands in it.
-                sheet = Sheet(self.spool, held.iter_rows())
-                if not sheet.is_empty:
-                    self.add("", name, None, sheet)
-                    self.durations[name] = sorted(sheet.durations)
-                    self.switches[name] = sorted(sheet.switches.items())
-
-    @property
-    def told(self) -> dict[str, Any]:
-        """What the parent hears: also hidden sheets, columns of durations [s] and of TRUE or FALSE."""
-        more = {"hidden": self.hidden, "durations": self.durations, "switches": self.switches}
-        return {**super().told, **more, UNCALCULATED: self.is_uncalculated}
-
-
-def _is_uncalculated(path: str) -> bool:
-    """Whether a cell of a workbook of XML has a formula and no value: its writer doesn't calculate."""
-    if not zipfile.is_zipfile(path):
-        return False
-    with zipfile.ZipFile(path) as archive:
-        for member in archive.namelist():
-            if member.startswith("xl/worksheets/") and member.endswith(".xml"):
-                with archive.open(member) as file:
-                    before = b""
-                    while part := file.read(BLOCK_BYTES):
-                        if _NO_VALUE.search(before + part):
-                            return True
-                        before = part[-_LONGEST_CELL:]
-    return False
-
-
-def _cell(value: Any) -> str:
-    """A cell as a line of text, dates by ISO 8601, whole numbers without decimals."""
-    if value is None or isinstance(value, str):
-        return " ".join((value or "").replace("\0", "").splitlines())
-    if isinstance(value, bool) or (isinstance(value, float) and value.is_integer() and abs(value) < 1e15):
-        return str(int(value))
-    if isinstance(value, date) and value.year == 1900:
-        return _hours(value)
-    if isinstance(value, datetime):
-        return value.isoformat(" ")
-    if isinstance(value, timedelta):
-        return repr(value.total_seconds())
-    return value.isoformat() if isinstance(value, date | time) else str(value)
-
-
-def _hours(value: date) -> str:
-    """A date of 1900, which a cell of hours becomes from a day on, as hours, minutes and seconds."""
-    moment = value if isinstance(value, datetime) else datetime.combine(value, time())
-    minutes, rest = divmod(moment - datetime(1899, 12, 31), timedelta(minutes=1))
-    return f"{minutes // 60}:{minutes % 60:02}:{rest.seconds:02}.{rest.microseconds:06}"
 
 
 class Tdms(Container):

@@ -36,6 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError, install_words, listed, quoted
+from fogml.readers.matlab import RESERVED, USER_BLOCK
 from fogml.runs.columns import column_spec, parse_header, stated_cell
 from fogml.runs.container_files import Group, grouped, unknown_fields
 from fogml.runs.facts import Facts, facts_from
@@ -111,9 +112,7 @@ def write_hdf5(run: Run, cells: dict[str, str], path: Path) -> None:
         file.attrs[FACTS_KEY] = json.dumps(run.facts.as_dict(), ensure_ascii=False)
 
 
-_USER_BLOCK = 512
 _LARGEST_V5_BYTES = 1 << 31
-_RESERVED = ("units", "facts")
 _VARIABLE = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}\Z")
 
 
@@ -186,7 +185,7 @@ def write_mat(
     """
     labels = {name: parse_header(cell) for name, cell in cells.items()}
     for label, _ in labels.values():
-        if not _VARIABLE.match(label) or label in (*_RESERVED, "run"):
+        if not _VARIABLE.match(label) or label in (*RESERVED, "run"):
             raise InputError(
                 f"{path.name}: column {quoted(label)} can't be named so in a MATLAB file; rename it to "
                 "letters, digits and underscores, or write CSV or Parquet"
@@ -201,7 +200,7 @@ def write_mat(
         vectors: dict[str, Any] = {label: run.columns[name][:, None] for name, (label, _) in labels.items()}
         savemat(path, {**vectors, "units": units, "facts": facts}, long_field_names=True, do_compression=True)
         return
-    with _h5py_module().File(path, "w", userblock_size=_USER_BLOCK, track_order=True) as file:
+    with _h5py_module().File(path, "w", userblock_size=USER_BLOCK, track_order=True) as file:
         for name, (label, _) in labels.items():
             dataset = file.create_dataset(label, data=run.columns[name][None, :], compression="gzip")
             dataset.attrs["MATLAB_class"] = np.bytes_("double")

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from fogml.errors import InputError, listed, quoted
+from fogml.errors import InputError, counted, listed, quoted
 from fogml.folders import with_slashes
 from fogml.outputs import scratch_folder
-from fogml.readers import READERS, UNCALCULATED, reader_of, reader_of_content
+from fogml.readers import READERS, reader_of, reader_of_content
 from fogml.runs.columns import DUTY, column_spec, parse_header
 from fogml.runs.csv_dialect import has_rows, is_sure
 from fogml.runs.findings import Finding
@@ -52,7 +53,8 @@ class HeldText:
         self.findings: tuple[Finding, ...] = ()
         self.durations: Collection[int] = ()
         self._switches: dict[int, int] = {}
-        self._of = path, kind, limits
+        self._file = path.name
+        self._is_uncalculated = False
         try:
             self._unpack(path, kind, limits)
         except BaseException:
@@ -64,17 +66,20 @@ class HeldText:
             array, *others = (_sheets if kind == "workbook" else _member)(path, stored)
             parts = stored.text(array)
             first = next(parts, b"")
+            self._is_uncalculated = stored.told.get("is_uncalculated", False)
             if kind == "packed":
                 _check_text(path, first)
             elif not has_rows(first):
                 self.check_values("")
-            self.durations = stored.told.get("durations", {}).get(array.name, ())
-            self._switches = dict(stored.told.get("switches", {}).get(array.name, ()))
+            sheet = stored.told.get("sheets", {}).get(array.name, {})
+            self.durations = sheet.get("durations", ())
+            self._switches = dict(sheet.get("switches", ()))
+            self.findings = tuple(_of_cells(sheet))
             if array.name in stored.told.get("hidden", ()):
                 message = (
                     f"the hidden sheet {quoted(array.name)} is read, as no sheet that is shown holds a run"
                 )
-                self.findings = (Finding("hidden_sheet", message),)
+                self.findings += (Finding("hidden_sheet", message),)
             if unread := [sheet.name for sheet in others if sheet.name not in stored.told.get("hidden", ())]:
                 message = (
                     f"the sheet {quoted(array.name)} is read, and {listed(map(quoted, unread))} not, which "
@@ -99,7 +104,7 @@ class HeldText:
         for place, name in enumerate(parse_header(cell)[0] for cell in table.cells):
             spec = column_spec(name)
             if place in self._switches and spec is not None and spec.internal != DUTY:
-                where = f"{self._of[0].name}, line {self._switches[place]}, column '{name}'"
+                where = f"{self._file}, line {self._switches[place]}, column '{name}'"
                 raise InputError(
                     f"{where}: holds TRUE or FALSE, where a number was expected; correct the cell"
                 )
@@ -116,15 +121,34 @@ class HeldText:
 
     def check_values(self, place: str) -> None:
         """Refuse a workbook of formulas without values."""
-        path, kind, limits = self._of
-        if kind != "workbook":
-            return
-        with stored_file(path, kind, (UNCALCULATED,), limits) as stored:
-            if stored.told[UNCALCULATED]:
-                raise InputError(
-                    f"{path.name}{place}: empty, and the workbook holds formulas without values; open the "
-                    "file in a spreadsheet program and save it"
-                )
+        if self._is_uncalculated:
+            raise InputError(
+                f"{self._file}{place}: empty, and the workbook holds formulas without values; open the "
+                "file in a spreadsheet program and save it"
+            )
+
+
+def _of_cells(sheet: Mapping[str, Any]) -> Iterator[Finding]:
+    """What is to be said of cells that a spreadsheet program shows otherwise than they are read."""
+    count, *lines = sheet.get("hidden_rows", (0,))
+    if count:
+        message = (
+            f"{counted(count, 'row')} that the sheet does not show, the first line {lines[0]}, read as any "
+            "other; delete them, or copy those that are shown to a file of their own, if they are not meant"
+        )
+        yield Finding("hidden_rows", message, row=lines[0], count=count)
+    if empty := sheet.get("uncalculated"):
+        message = (
+            f"column {listed(empty)} holds formulas without values, which are missing; open the file in a "
+            "spreadsheet program and save it"
+        )
+        yield Finding("uncalculated", message, count=len(empty))
+    if shares := sheet.get("shares"):
+        message = (
+            f"cells shown in percent in column {listed(shares)} are read as shares, 50 % as 0.5; write "
+            "'[%]' in the header where percent are meant, '[1]' where not"
+        )
+        yield Finding("percent_cells", message, count=len(shares))
 
 
 def _sheets(path: Path, stored: StoredFile) -> list[StoredArray]:
