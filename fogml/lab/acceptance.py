@@ -72,22 +72,25 @@ def acceptance_json(
     Raises
     ------
     InputError
-        For runs of several units or axes, or of another than the model's, and for a short one at rest.
+        For runs of several units or axes, or of another than the model's.
     """
     limits = limits or Limits()
     _check_one_gyro(runs)
     (runs,) = named_apart(runs)
     errors = [_errors(run, model) for run in runs]
-    turned = {one.run.name for one in errors if not _rests(one, averaging_s)}
+    brief = {one.run.name for one in errors if not _rests(one, averaging_s)}
+    turned = {one.run.name for one in errors if one.run.name in brief and turning(one.run).any()}
     judged = []
     for one in errors:
         known, apart = one.run.earth_known, averaging_s
         if one.run.name in turned:
             # Its turns tell what they tell without an average of its rests.
-            one, apart = replace(one, used=np.ones_like(one.used)), min(averaging_s, 0.25 * one.run.span_s)
+            one = replace(one, used=np.ones_like(one.used))
+        if one.run.name in brief:
+            apart = min(averaging_s, max(0.25 * one.run.span_s, one.run.sample_s) or averaging_s)
         judged.append(judge_run(one, apart, (0.0, 0.0), known, turn_on_band, noise))
     after = [_compensated(one) for one in errors]
-    figures = dict(figures_of(runs, after, judged, noise, limits, turned))
+    figures = dict(figures_of(runs, after, judged, noise, limits, turned, brief))
     rows = [_row(one, figures.get(one.key), limits, model is not None) for one in QUANTITIES]
     seen = _seen(runs, model)
     still = [f"{one.run}: the output stands still: {one.still[0]}" for one in judged if one.still]
@@ -99,11 +102,15 @@ def acceptance_json(
     notes += _of_earth(runs)
     notes += [f"{name}: the model was trained on this run" for name in seen]
     notes += _left_out([one for one in errors if one.run.name not in turned]) + _near(rows, limits)
-    if turned:
-        notes.append(
-            f"{listed(sorted(turned), 3)}: the table rests for less than two averages over {averaging_s:g} s "
-            "(--averaging), which tells no bias; scale factor, threshold and resolution are told all the same"
-        )
+    for names, rest, others in (
+        (turned, "the table rests for", "scale factor, threshold and resolution"),
+        (brief - turned, "the run holds", "noise terms and bias stability over 10 s"),
+    ):
+        if names:
+            notes.append(
+                f"{listed(sorted(names), 3)}: {rest} less than two averages over {averaging_s:g} s "
+                f"(--averaging), which tells no bias; {others} are told all the same"
+            )
     small = {run.name for run in runs if small_rates(run)}
     if small:
         notes.append(
@@ -122,7 +129,7 @@ def acceptance_json(
         "runs": [_run(run, one) for run, one in zip(runs, judged, strict=True)],
         "model": None if model is None else _model(model),
         "limits": _limits(limits),
-        "soaks": soak_table([one for one in judged if one.run not in small | turned]),
+        "soaks": soak_table([one for one in judged if one.run not in small | brief]),
         "rows": rows,
         "verdict": verdict,
         "reasons": reasons,
@@ -162,11 +169,11 @@ def _errors(run: Run, model: DriftModel | None) -> RunErrors:
 
 
 def _rests(errors: RunErrors, averaging_s: float) -> bool:
-    """Whether a run tells a bias: it does not turn, or rests for two averages."""
-    time = errors.run.time
-    if not (moving := turning(errors.run)).any() or averaging_s < errors.run.sample_s:
+    """Whether a run tells a bias: it rests for two averages."""
+    if averaging_s < errors.run.sample_s:
         return True
-    return len(block_averages(time[errors.used & ~moving], window_s=averaging_s)) > 1
+    resting = errors.used & ~turning(errors.run)
+    return len(block_averages(errors.run.time[resting], window_s=averaging_s)) > 1
 
 
 def _left_out(errors: Sequence[RunErrors]) -> list[str]:

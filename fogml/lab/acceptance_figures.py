@@ -87,10 +87,10 @@ def _line(run: str, group: list[SoakBias]) -> dict[str, Any]:
     return line
 
 
-_OF_BIAS = ("bias", "bias_stability", "bias_stability_10s")
-"""Figures that rates about zero spoil: what a gyro does not see of them is no instability."""
 _OF_RUNS = (
-    *_OF_BIAS,
+    "bias",
+    "bias_stability",
+    "bias_stability_10s",
     "temperature_sensitivity",
     "hysteresis",
     "scale_factor_error",
@@ -125,6 +125,7 @@ def figures_of(
     noise: Run | None,
     limits: Limits,
     turned: Container[str] = (),
+    brief: Container[str] = (),
 ) -> Iterator[tuple[str, Figure]]:
     """Each quantity that the runs tell.
 
@@ -138,13 +139,15 @@ def figures_of(
         A static run for the noise terms; by default one of the runs.
     limits
         Of a figure of single runs that is told which violates its limit most.
-    turned
-        Names of runs whose rests tell no bias.
+    turned, brief
+        Names of runs with turns whose rests tell no bias, and of all runs that tell none.
     """
-    rested = [one for one in judged if one.run not in turned]
+    rested = [one for one in judged if one.run not in brief]
     small = {run.name for run in before if small_rates(run)}
     steady = [one for one in rested if one.run not in small] or rested
-    biased = {**dict.fromkeys(_OF_BIAS, steady), "bias": known_earth(steady)}
+    # Rates about zero spoil these: what a gyro does not see of them is no instability.
+    often = [one for one in judged if one.run not in turned and one.run not in small] or steady
+    biased = {"bias": known_earth(steady), "bias_stability": steady, "bias_stability_10s": often}
     for key in _OF_RUNS:
         told = [one for one in biased.get(key, judged) if getattr(one.after, key) is not None]
         if told:
@@ -296,11 +299,11 @@ def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) ->
         return
     for key, letter in TERMS.items():
         terms = [one[letter] for one in told]
-        low, high = terms[0]["ci"]
+        (_, high), (low, most) = (term["ci"] for term in terms)
         if all(term["value"] is not None for term in terms):
-            remark = f"90 % of {short(low)} to {short(high)}"
-            own = tuple(terms[1]["ci"])
-            yield key, Figure(terms[0]["value"], terms[1]["value"], pair[0].name, remark, ci90=own)
+            remark = f"90 % of {short(low)} to {short(most)}"
+            values = (terms[0]["value"], terms[1]["value"])
+            yield key, Figure(*values, pair[0].name, remark, ci90=(low, most))
         elif all(term["ci"][1] for term in terms):
             remark = "not told from the other terms; upper end of the 90 % interval"
-            yield key, Figure(high, terms[1]["ci"][1], pair[0].name, remark, at_most=True)
+            yield key, Figure(high, most, pair[0].name, remark, at_most=True)

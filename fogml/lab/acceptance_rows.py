@@ -56,6 +56,7 @@ class Quantity:
         return self.called or re.split(r", | \(", self.name)[0].lower()
 
 
+_RESTS = "two averages at rest (--averaging)"
 _RATES = "turns of a rate table (column rate)"
 _LADDER = "four rates of a rate table or more, of both senses"
 _BOTH_SENSES = "rates of both senses, and rest"
@@ -70,8 +71,8 @@ _POWER_ON = "a stated power-on (powered_on) and a band (--turn-on-band)"
 _OFTEN = "a sample in 5 s or more often"
 
 QUANTITIES = (
-    Quantity("bias", "Bias", "零偏", "deg/h", "a run"),
-    Quantity("bias_stability", "Bias stability, of the averages", "零偏稳定性", "deg/h", "a run"),
+    Quantity("bias", "Bias", "零偏", "deg/h", _RESTS),
+    Quantity("bias_stability", "Bias stability, of the averages", "零偏稳定性", "deg/h", _RESTS),
     Quantity("bias_stability_10s", "Bias stability, 10 s averages", "零偏稳定性", "deg/h", _OFTEN),
     Quantity("bias_repeatability", "Bias repeatability", "零偏重复性", "deg/h", _CYCLES),
     Quantity(

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray, IndexArray
+from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.runs.settling import LEAST_ROWS, error_of_mean, settling_rows
+from fogml.runs.settling import LEAST_ROWS, error_of_mean, unsettled_rows
 from fogml.runs.transitions import LONGEST_TRANSITION_S
 from fogml.runs.turning import white_noise
 
@@ -108,7 +108,10 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
     changes = (np.abs(np.diff(rate)) > _NOISES * white_noise(rate[~turning])) | turning[1:] | turning[:-1]
     steps = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(rate)]]).astype(np.intp)
     reach = max(round(2.0 * LONGEST_TRANSITION_S / run.sample_s), 4 * LEAST_ROWS)
-    settling, leaving = _unsettled(output, rate, steps, reach) if settle_s is None else (0, 0)
+    settling = leaving = 0
+    if settle_s is None:
+        heights = 3600.0 * np.diff(rate)[steps[1:-1] - 1]
+        settling, leaving = unsettled_rows(output, steps, heights, (SETTLING_ROWS, 0), (len(rate), reach))
     rows = []
     for start, stop in zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True):
         settled, left, most = start, stop, max(SETTLING_ROWS, (stop - start) // 2)
@@ -128,28 +131,6 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
     start, stop = columns[:, :2].astype(np.intp).T
     values = [*columns[:, 2:].T, _clipped(output, rows)]
     return Plateaus(start, stop, *values)
-
-
-def _unsettled(output: FloatArray, rate: FloatArray, steps: IndexArray, reach: int) -> tuple[int, int]:
-    """Rows at the begin of plateaus in which gyro and table have not settled, and at the end in which they
-    have left, as where the recorded rate comes late; by all plateaus between `steps` together.
-
-    Either is told by plateaus without the other, which the begin is looked into twice for; how they end, by
-    their last rows, `reach` of them at most.
-    """
-    first, last, count = steps[:-1], steps[1:], len(output)
-    rise = 3600.0 * (rate[first[1:]] - rate[first[1:] - 1])
-    lasting = last - first >= LEAST_ROWS
-    begins, ends = lasting[1:], lasting[:-1]
-    settling = leaving = 0
-    for _ in range(2):
-        kept = np.append(last[:-1] - leaving, last[-1])[1:]
-        settling = settling_rows(output, first[1:][begins], kept[begins], rise[begins], SETTLING_ROWS)
-        kept = count - (np.append(0, first[1:] + settling))[:-1]
-        ended = count - last[:-1]
-        kept = np.minimum(kept, ended + reach)
-        leaving = settling_rows(output[::-1], ended[ends], kept[ends], -rise[ends], 0)
-    return settling, leaving
 
 
 def _clipped(

@@ -70,6 +70,44 @@ def settling_rows(
         first = last
 
 
+def unsettled_rows(
+    output: FloatArray,
+    edges: IndexArray,
+    heights: FloatArray,
+    first: tuple[int, int],
+    reach: tuple[int, int],
+) -> tuple[int, int]:
+    """Rows at the begin of plateaus in which gyro and table have not settled, and at the end in which they
+    have left, as where the recorded rate comes late; by all plateaus together.
+
+    Either is told by plateaus without the other, which the begin is looked into twice for.
+
+    Parameters
+    ----------
+    output
+        The gyro's output, shape (n,).
+    edges
+        Rows at which plateaus begin, the first row and n among them, shape (k + 1,).
+    heights
+        Steps between them, shape (k - 1,).
+    first
+        Rows that the searches begin with, at begins and at ends.
+    reach
+        Rows of a plateau that are looked at, at most, from either end.
+    """
+    begin, end, count = edges[:-1], edges[1:], len(output)
+    lasting = end - begin >= LEAST_ROWS
+    begins, ends = lasting[1:], lasting[:-1]
+    settling, leaving = 0, 0
+    for _ in range(2):
+        kept = np.minimum(np.append(end[:-1] - leaving, end[-1])[1:], begin[1:] + reach[0])
+        settling = settling_rows(output, begin[1:][begins], kept[begins], heights[begins], first[0])
+        ended = count - end[:-1]
+        kept = np.minimum(count - np.append(0, begin[1:] + settling)[:-1], ended + reach[1])
+        leaving = settling_rows(output[::-1], ended[ends], kept[ends], -heights[ends], first[1])
+    return settling, leaving
+
+
 class _Settled(NamedTuple):
     """A plateau: first row, the row that its second half begins with, the step before it, and of that half.
 

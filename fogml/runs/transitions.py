@@ -9,7 +9,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.runs.settling import LEAST_ROWS, settling_rows
+from fogml.runs.settling import LEAST_ROWS, unsettled_rows
 from fogml.runs.turning import least_rate_deg_s, white_noise
 from fogml.signals import large
 
@@ -70,7 +70,8 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
     margin_s
         Samples within this time of a change are cut [s]; by default m = t_z + 2.5 s with t_z the
         table's time to rate, within the source's bounds t_z < m < t_z + 5 s; after a change as long as all
-        changes together show that gyro or table have not settled.
+        changes together show that gyro or table have not settled, before one as long as they show that these
+        have left, the recorded rate being late.
 
     Raises
     ------
@@ -87,13 +88,13 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
             f"the margin about a change of the table's rate must not be negative, got {margin_s:g} s"
         )
     changes, time = _changes(run), run.time
-    settled_s = margin_s
     by_default = margin_s is None
-    if margin_s is None or settled_s is None:
-        margin_s = time_to_rate_s(run) + MARGIN_BEYOND_S
-        settled_s = _settling_s(run, changes, margin_s)
+    if margin_s is None:
+        settled_s, left_s = _unsettled_s(run, changes, time_to_rate_s(run) + MARGIN_BEYOND_S)
+    else:
+        settled_s = left_s = margin_s
     starts = changes.start
-    first = np.searchsorted(time, time[starts] - margin_s)
+    first = np.searchsorted(time, time[starts] - left_s)
     last = np.searchsorted(time, time[starts] + settled_s, side="right")
     if by_default:
         last = np.maximum(last, changes.stop)
@@ -215,28 +216,36 @@ def _gyro_settling_s(run: Run, changes: _Changes, settled_share: float, noises: 
     return longest
 
 
-def _settling_s(run: Run, changes: _Changes, least_s: float) -> float:
-    """Time after changes in which all of them together show that gyro or table have not settled [s].
+def _unsettled_s(run: Run, changes: _Changes, least_s: float) -> tuple[float, float]:
+    """Time after changes in which all of them together show that gyro or table have not settled, and time
+    before them in which they show that these have left, as where the recorded rate comes late [s].
 
-    `least_s` or longer, half of the shortest plateau at most.
+    `least_s` or longer, half of the shortest plateau at most that tells it.
     """
     if len(changes.start) == 0:
-        return least_s
-    edges = np.concatenate([changes.start, [len(run)]])
-    limits = np.searchsorted(run.time, run.time[changes.start] + LONGEST_TRANSITION_S)
-    stops = np.minimum(edges[1:], limits)
+        return least_s, least_s
+    edges = np.concatenate([[0], changes.start, [len(run)]])
     first = max(1, round(least_s / run.sample_s))
-    kept = (stops - changes.start >= 4 * first) & (changes.start >= LEAST_ROWS)
-    if not kept.any():
-        return least_s
-    starts, stops = changes.start[kept], stops[kept]
-    series = run.gyro
-    heights = np.array(
-        [
-            float(series[(start + stop) // 2 : stop].mean() - series[start - LEAST_ROWS : start].mean())
-            for start, stop in zip(starts.tolist(), stops.tolist(), strict=True)
-        ]
+    reach = max(round(LONGEST_TRANSITION_S / run.sample_s), LEAST_ROWS)
+    levels = _middles(run.gyro, edges, reach)
+    rows = unsettled_rows(run.gyro, edges, levels[1:, 0] - levels[:-1, 1], (first, first), (reach, reach))
+    lasting = np.minimum(np.diff(edges), reach)
+    longest = 0.5 * float(min(lasting[lasting >= 4 * first], default=0)) * run.sample_s
+    settled_s, left_s = (
+        least_s if n <= first else max(least_s, min(n * run.sample_s, longest)) for n in rows
     )
-    rows = settling_rows(series, starts, stops, heights, first)
-    longest = 0.5 * float(np.min(run.time[stops - 1] - run.time[starts]))
-    return max(least_s, min(rows * run.sample_s, longest)) if rows > first else least_s
+    return settled_s, left_s
+
+
+def _middles(series: FloatArray, edges: IndexArray, reach: int) -> FloatArray:
+    """Means in the middle of plateaus, of their first rows and of their last, `reach` at most; (k, 2).
+
+    A clock that is early or late by a quarter of that leaves them as they are.
+    """
+
+    def mean(first: int, last: int) -> float:
+        quarter = (last - first) // 4
+        return float(series[first + quarter : last - quarter].mean())
+
+    pairs = zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+    return np.array([(mean(a, min(b, a + reach)), mean(max(a, b - reach), b)) for a, b in pairs])

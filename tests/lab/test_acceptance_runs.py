@@ -70,6 +70,27 @@ def test_a_ladder_that_hardly_rests_tells_its_scale_factor_and_no_bias(cycle, st
     assert "ladder" in acceptance_page(both)
 
 
+@pytest.mark.parametrize("seconds", [3, 40, 140])
+def test_a_static_run_too_short_for_a_bias_leaves_the_others_their_figures(cycle, seconds):
+    """It refused the report altogether."""
+    noise = 0.3 * np.random.default_rng(4).standard_normal(seconds)
+    run = table_run("short", [0.0], [0.2], stay=seconds)
+    columns = {name: run.columns[name] for name in ("time", "T")}
+    short = Run.from_columns("short", EAST, **columns, gyro=0.2 + noise)
+    alone, both = acceptance_json([short]), acceptance_json([cycle, short])
+    for values in (alone, both):
+        assert any(note.startswith("short: the run holds less than two averages") for note in values["notes"])
+    for key in ("bias", "bias_stability"):
+        assert "two averages at rest" in row(alone, key)["remark"]
+        assert row(both, key) == row(acceptance_json([cycle]), key)
+    told = row(alone, "bias_stability_10s")
+    assert told["tested"] is (seconds >= 20)
+    if told["tested"]:
+        means = noise[: seconds // 10 * 10].reshape(-1, 10).mean(axis=1)
+        assert told["before"] == pytest.approx(np.std(means, ddof=1))
+    assert "short" in acceptance_page(both)
+
+
 def warming(name, time_constant_s, ramp_deg_h=0.0):
     time = np.arange(7200.0)
     noise = 1e-4 * np.random.default_rng(1).standard_normal(len(time))

@@ -96,6 +96,18 @@ def test_a_run_of_samples_with_noise(tmp_path: Path) -> None:
     assert abs(found.delta_x_deg - 5.0) < 5 * found.se["delta_x_deg"] < 1e-3
 
 
+@pytest.mark.parametrize("late_s", [-2.0, 5.0])
+def test_a_table_on_another_clock_tells_the_same(late_s: float) -> None:
+    rows, time = samples(
+        UNIT, TILTS, (36.0, 72.0), noise=1e-4, sample_s=0.2, acceleration_deg_s2=40.0, seed=2
+    )
+    recorded = np.interp(time - late_s, time, rows.rate_deg_s)
+    found = decouple(from_samples(replace(rows, rate_deg_s=recorded), time))
+    assert found.se is not None
+    assert abs(found.K - 1.2345) < 5 * found.se["K"] < 1e-5
+    assert abs(found.delta_x_deg - 5.0) < 5 * found.se["delta_x_deg"] < 1e-3
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

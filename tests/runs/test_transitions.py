@@ -113,6 +113,22 @@ def test_every_sample_that_is_left_is_on_a_plateau():
     assert np.abs(followed(run.time, 4.0) - commanded(run.time))[left].max() < 1e-9
 
 
+@pytest.mark.parametrize("late_s", [-8.0, 3.0, 5.0, 12.0])
+@pytest.mark.parametrize("sample_s", [0.1, 1.0])
+def test_nothing_is_left_that_another_clock_puts_at_another_rate(late_s, sample_s):
+    """Turns of a minute, rests of a minute; a table's log that is late or early by seconds."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 2400.0, sample_s)
+    programme = np.array([0.0, 10.0, 0.0, -10.0])
+    true, recorded = (
+        programme[(np.maximum(time - delay, 0.0) // 60.0).astype(int) % 4] for delay in (0.0, late_s)
+    )
+    gyro = 3600.0 * 1.0002 * true + 0.02 * time + 2.0 * rng.standard_normal(len(time))
+    mask = transition_mask(Run.from_columns(time=time, gyro=gyro, rate=recorded))
+    assert (recorded == true)[~mask].all()
+    assert mask.mean() < 0.75
+
+
 def test_slow_samples_on_both_sides_of_a_change_are_cut():
     run = runs(10.0)["command"]
     rows = find_transitions(run)
