@@ -145,16 +145,13 @@ class FloorModel:
         if self.loud > _NOTICED:
             source += f" without the {percent(self.loud, 0)} of it that is loud"
         measured, its_variance = self.fast.averages_variance(averaging_s, windows)
+        shares = {
+            name: averages_variance(name, self.sample_s, averaging_s, windows, self.fast.from_hz)
+            for name in self.counted
+        }
         squares, errors = [], []
         for model, fit in (*self.fits, *self.slow):
-            share = np.array(
-                [
-                    averages_variance(name, self.sample_s, averaging_s, windows, self.fast.from_hz)
-                    if name in self.counted
-                    else 0.0
-                    for name in fit.terms.names
-                ]
-            )
+            share = np.array([shares.get(name, 0.0) for name in fit.terms.names])
             squares.append(measured + float(share @ fit.coefficients))
             errors.append(its_variance + float(share @ _covariance(model, fit) @ share))
         square = float(self.weights @ squares[: len(self.fits)])
