@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from fogml.errors import InputError, quoted
 from fogml.runs.columns import parse_header
 from fogml.runs.header_spelling import DATE_NAMES, canonical_cells, uncommented, with_units_below
 from fogml.runs.stamps import stamp_form
@@ -153,6 +154,29 @@ def header_over_lines(lines: Sequence[str]) -> Header | None:
         return found
     begins.append(len(lines))
     return replace(joined, line=begins[joined.line], data=begins[joined.data])
+
+
+def names_others(fields: Sequence[str], cells: Sequence[str]) -> bool:
+    """Whether a line among data is a header of other columns or units than a file's cells."""
+    if any(is_number_like(field) for field in fields) or not all(map(str.strip, fields)):
+        return False
+    found = Header(0, 1, "", canonical_cells([field.strip(' "') for field in fields]))
+    own = [parse_header(cell) for cell in canonical_cells(cells)]
+    if not found.is_sure and not {name for name, _ in own} <= {parse_header(cell)[0] for cell in found.cells}:
+        return False
+    told = [parse_header(cell) for cell in found.cells]
+    return len(told) != len(own) or any(
+        name != other or (unit and known and unit != known)
+        for (name, unit), (other, known) in zip(told, own, strict=True)
+    )
+
+
+def another_header(file: str, line: int, text: str) -> InputError:
+    """What to say of such a line."""
+    return InputError(
+        f"{file}, line {line}: another header, {quoted(text.strip())}, of other columns or units than the "
+        "first; save the rows from there on as a file of their own"
+    )
 
 
 def fields_of(line: str, separator: str) -> list[str]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError, counted, quoted
 from fogml.runs.csv_dialect import CsvDialect
-from fogml.runs.csv_header import fields_of
+from fogml.runs.csv_header import another_header, fields_of, names_others
 from fogml.runs.csv_source import CsvSource, number
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
@@ -82,6 +82,8 @@ class LineReader:
                 values.append(self._values(fields, line))
                 stamps.append([fields[place] for place in self.dialect.stamp_places])
             except _Fault as fault:
+                if names_others(fields, self.dialect.cells):
+                    raise another_header(self.path.name, line, self.dialect.separator.join(fields)) from None
                 if not self.repair:
                     cure = "correct the line, or --repair drops such rows"
                     raise InputError(f"{self.path.name}, {fault}; {cure}") from None

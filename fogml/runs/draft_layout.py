@@ -23,6 +23,8 @@ from fogml.runs.profile_parts import SEPARATORS
 from fogml.yaml_text import parse_yaml
 
 MOST_ROWS = 200
+_LEAST_ROWS = 8
+"""Lines of as many numbers as the data have: facts above them are fewer on end."""
 _TAIL_BYTES = 1 << 12
 
 
@@ -47,17 +49,24 @@ def text_layout(path: Path) -> tuple[list[str], list[Field]]:
     """The layout's keys and the fields of a text file."""
     head, encoding = decoded_head(path)
     stamp = mark_of_line_stamps(head.splitlines()[-MOST_ROWS:])
-    name, lines, data = _table_of(head, stamp)
+    name, lines, data, is_broken = _table_of(head, stamp)
     mark = SEPARATORS[name]
     if data is None:
         raise InputError(f"{path.name}: no rows of numbers in its first lines; a draft needs some")
-    rows = [_split(line, mark) for line in lines[data : data + MOST_ROWS] if line.strip()]
+    rows = [_split(line, mark) for line in lines[data : data + MOST_ROWS] if not _is_blank(line, mark)]
     width = len(rows[0])
+    numeric = _numeric(rows, width)
+    rows = [row for row in rows if _is_data(row, width, numeric)]
     marks = marks_of(CsvSource(path), rows, mark or " ")
     layout = [f"line_stamp: {as_yaml(stamp)}"] if stamp is not None else []
     layout += [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
     if encoding not in ("utf-8-sig", "utf-8"):
-        layout.append(f"encoding: {encoding}    # GUESS: are the names right? else cp1251, shift_jis, ...")
+        doubt = (
+            ""
+            if encoding.startswith("utf")
+            else "    # GUESS: are the names right? else cp1251, shift_jis, ..."
+        )
+        layout.append(f"encoding: {encoding}{doubt}")
     header = _Header.above(lines, data, width, mark)
     if header is None or header.is_by_place:
         # A name would be of none of its columns, or of several.
@@ -72,14 +81,14 @@ def text_layout(path: Path) -> tuple[list[str], list[Field]]:
             told = as_yaml(lines[header.line].strip()[:60])
             layout.append(f"header_text: {told}    # the header is the first line that holds this")
         fields = [Field(cell.strip(' "'), *parse_header(right)) for cell, right in header.cells]
-    below = _are_below(path, encoding, mark, rows, stamp)
+    below = is_broken or _are_below(path, encoding, mark, rows, stamp)
     with_units = header is not None and header.with_units and not header.is_by_place
     if with_units or below:
         keys = ["not_numbers: true", *(["wrong_field_count: true"] if below else [])]
-        what = ["the row of units below the header"] * with_units + ["the lines below the data"] * below
+        what = ["the row of units below the header"] * with_units + ["lines within or below the data"] * below
         layout.append(f"reject: {{{', '.join(keys)}}}    # {' and '.join(what)}: left out")
     for place, one in enumerate(fields):
-        one.first, one.marks = [row[place] for row in rows if len(row) == width], marks
+        one.first, one.marks = [row[place] for row in rows], marks
     return layout, fields
 
 
@@ -161,22 +170,32 @@ def _are_below(
     return any(len(f) != width or not all(is_number_like(f[i].strip(' "')) for i in held) for f in lines)
 
 
-def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None]:
-    """The separator's name, the lines, and the first line of numbers."""
-    best: tuple[float, str, list[str], int | None] = (0.0, "comma", _lines(text), None)
+def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None, bool]:
+    """The separator's name, the lines, the first line of numbers, and whether other lines stand below it."""
+    best: tuple[float, str, list[str], int | None, bool] = (0.0, "comma", _lines(text), None, False)
+    labview = labview_header(_lines(text))
     for name, mark in SEPARATORS.items():
+        if labview is not None and mark != labview.separator:
+            continue
         lines = _lines(text if stamp is None else stamp_apart(text, stamp, mark))
         rows = [_split(line, mark) for line in lines[-MOST_ROWS:] if line.strip()]
         counts = [len(row) for row in rows]
         width = max(set(counts), key=counts.count) if counts else 0
         numeric = _numeric(rows, width)
-        is_data = [not t.strip() or _is_data(_split(t, mark), width, numeric) for t in lines]
-        first = _first_of_longest(is_data, lines)
+        is_data = [_is_blank(t, mark) or _is_data(_split(t, mark), width, numeric) for t in lines]
+        first = _first_of_rows(is_data, [not _is_blank(t, mark) for t in lines])
         numbers = [sum(is_number_like(f.strip(' "')) for f in row) for row in rows]
         score = float(np.median(numbers)) if numbers else 0.0
         if first is not None and score > best[0]:
-            best = (score, name, lines, first)
+            below = zip(is_data[first:], lines[first:], strict=True)
+            is_broken = any(not sound or (t.strip() and _is_blank(t, mark)) for sound, t in below)
+            best = (score, name, lines, first, is_broken)
     return best[1:]
+
+
+def _is_blank(line: str, mark: str | None) -> bool:
+    """Whether a line holds nothing, or nothing between its separators."""
+    return not line.strip(f'{mark or ""} \t"')
 
 
 def _lines(text: str) -> list[str]:
@@ -184,11 +203,15 @@ def _lines(text: str) -> list[str]:
     return re.split(r"\r\n|\r|\n", text)[:-1] or [text]
 
 
-def _first_of_longest(is_data: Sequence[bool], lines: Sequence[str]) -> int | None:
-    """Where the longest stretch of lines of numbers begins, blank ones apart; None where there is none."""
-    ends = [-1, *(i for i, data in enumerate(is_data) if not data), len(lines)]
-    stretches = [range(a + 1, b) for a, b in pairwise(ends)]
-    return next((i for i in max(stretches, key=len) if lines[i].strip()), None)
+def _first_of_rows(is_data: Sequence[bool], is_filled: Sequence[bool]) -> int | None:
+    """Where the first stretch of lines of numbers begins that is no block of facts above; None without any.
+
+    It has `_LEAST_ROWS` lines or is the longest: a remark or a blank line within the data parts stretches.
+    """
+    ends = [-1, *(i for i, data in enumerate(is_data) if not data), len(is_data)]
+    stretches = [[i for i in range(a + 1, b) if is_filled[i]] for a, b in pairwise(ends)]
+    least = min(_LEAST_ROWS, max(map(len, stretches)))
+    return next((found[0] for found in stretches if len(found) >= max(least, 1)), None)
 
 
 def _numeric(rows: Sequence[Sequence[str]], width: int) -> list[int]:

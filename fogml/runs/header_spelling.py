@@ -168,8 +168,11 @@ def _parts(cell: str) -> tuple[str, str | None]:
         if _meant(text) is not None and of_it is not None and is_unit(of_it):
             return text, of_it
     plain = cell.translate(_PARENTHESES)
-    if (match := _FORMS[0].match(plain)) and match["name"] and is_unit(match["unit"]):
-        return match["name"], canonical_unit(match["unit"])
+    # A sign of degrees stands in no name.
+    for form, sign in ((_FORMS[0], ""), (_FORMS[3], "°")):
+        match = form.match(plain)
+        if match and match["name"] and is_unit(match["unit"]) and sign in signs(match["unit"]):
+            return match["name"], canonical_unit(match["unit"])
     return name, unit
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError, counted, listed, quoted
+from fogml.runs.csv_header import another_header, names_others
 from fogml.runs.csv_lines import cut_error, cut_line
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
@@ -115,6 +116,7 @@ class _Reader:
         self.lines_before = self.rows_before = 0
         self.clock: StampClock | None = None
         self.filled: BoolArray | None = None
+        self.names: list[str] = []
         self.rejected: dict[str, Finding] = {}
 
     def read(self, parts: Iterator[tuple[bytes, bool]]) -> LoggerTable:
@@ -189,32 +191,31 @@ class _Reader:
     def _head(self, lines: Lines, numbers: IndexArray) -> tuple[IndexArray, int, dict[str | int, int]]:
         """The lines of data below the header, the fields of a row, and where each source stands."""
         numbers = numbers[self.profile.header_lines :]
-        names: list[str] | None = None
         if self.profile.header and len(numbers):
-            names = self._names(lines.line(int(numbers[0])))
+            self.names = self._names(lines.line(int(numbers[0])))
             numbers = numbers[1:]
         if len(numbers) == 0:
             raise InputError(f"{self.file}: no data rows; {self.hint}")
-        fields = self.profile.fields or (len(names) if names else 0)
-        return numbers, fields, self._places(names, fields)
+        fields = self.profile.fields or len(self.names)
+        return numbers, fields, self._places(fields)
 
     def _names(self, line: str) -> list[str]:
         separator = self.profile.text_separator
         names = [shown(name, separator) for name in line.split(separator)]
         return [name.strip().strip('"') for name in names] if self.profile.strip_names else names
 
-    def _places(self, names: list[str] | None, fields: int) -> dict[str | int, int]:
+    def _places(self, fields: int) -> dict[str | int, int]:
         """Position of each source column."""
         places: dict[str | int, int] = {}
         for source in (*self.profile.sources, *self.profile.text_sources):
             if isinstance(source, int):
                 places[source] = source
                 continue
-            found = [place for place, name in enumerate(names or []) if name == source]
+            found = [place for place, name in enumerate(self.names) if name == source]
             if len(found) != 1:
                 fault = "no column" if not found else "more than one column"
                 raise InputError(
-                    f"{self.file}: {fault} {quoted(source)}; the header holds {listed(names or [])}; "
+                    f"{self.file}: {fault} {quoted(source)}; the header holds {listed(self.names)}; "
                     f"{self.hint}"
                 )
             places[source] = found[0]
@@ -227,12 +228,7 @@ class _Reader:
         return places
 
     def _table(
-        self,
-        lines: Lines,
-        numbers: IndexArray,
-        fields: int,
-        places: dict[str | int, int],
-        is_last: bool,
+        self, lines: Lines, numbers: IndexArray, fields: int, places: dict[str | int, int], is_last: bool
     ) -> LoggerTable:
         """The table of a part's lines of data; its rows are counted from the part's first."""
         counts = lines.field_counts(self.profile.text_separator)[numbers]
@@ -244,7 +240,7 @@ class _Reader:
                 cure = "correct it, or leave such rows out by 'reject: {wrong_field_count: true}'"
                 told = f"{fields} fields were expected, line {line + 1} {held}"
                 raise InputError(f"{self.file}: {told}; {cure} in the profile; {self.hint}")
-            self._reject(f"without {fields} fields", short)
+            self._reject(f"without {fields} fields", short, lines, numbers)
         rows = np.flatnonzero(~short)
         content = lines.keep(numbers[rows])
         sources = {s: place for s, place in places.items() if s in self.profile.sources}
@@ -267,7 +263,7 @@ class _Reader:
                 raise self._faulty_fields(lines, int(numbers[rows[row]]), row, places, wrong, texts)
             bad = np.zeros(len(numbers), dtype=bool)
             bad[rows[faulty]] = True
-            self._reject("with text or nothing in a number's place", bad)
+            self._reject("with text or nothing in a number's place", bad, lines, numbers)
             rows, values = rows[~faulty], values[:, ~faulty]
             texts = {source: held[~faulty] for source, held in texts.items()}
             seconds = None if seconds is None else seconds[~faulty]
@@ -295,13 +291,16 @@ class _Reader:
         count, rows = int(np.count_nonzero(wrong[source])), len(wrong[source])
         return FaultyFields(place, str(source), told, count, rows, self.hint)
 
-    def _reject(self, what: str, rows: BoolArray) -> None:
-        """Count rejected rows; `rows` (n,) marks them among the data rows of a part."""
+    def _reject(self, what: str, rows: BoolArray, lines: Lines, numbers: IndexArray) -> None:
+        """Count rejected rows; `rows` (n,) marks them among lines of a part. Another header is refused."""
+        for number in numbers[rows].tolist() if self.names else ():
+            if names_others(self._names(lines.line(number)), self.names):
+                raise another_header(self.file, self.lines_before + number + 1, self._line(lines, number))
         before, count = self.rejected.get(what), int(np.count_nonzero(rows))
         count += before.count if before else 0
         row = before.row if before else self.rows_before + int(np.argmax(rows)) + 1
-        message = f"{counted(count, 'row')} {what} left out"
-        self.rejected[what] = Finding("rejected_rows", message, row=row, count=count)
+        told = f"{counted(count, 'row')} {what} left out"
+        self.rejected[what] = Finding("rejected_rows", told, row=row, count=count)
 
     def _seconds(self, texts: Mapping[str | int, NDArray[np.str_]]) -> FloatArray | None:
         """Times since the first stamp [s], NaN where a text is none; nothing without a clock of stamps."""

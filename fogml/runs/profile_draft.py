@@ -21,12 +21,22 @@ from fogml.runs.reader_process import stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS
 from fogml.runs.stamps import PARTS, stamp_form, stamps_of_parts
 
-_TIME = re.compile(r"time|stamp|clock|zeit|epoch|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
-_COUNT = re.compile(r"sample|index|count|packet|seq|row|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
+_TIME = re.compile(r"time|stamp|clock|zeit|epoch|tick|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
+_COUNT = re.compile(r"sample|index|count|packet|seq|row|scan|record|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
 _DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
 _GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
 _WARM = re.compile(r"temp|die|oven|therm|^t(\w{0,3}|[_.]\w*)$|温", re.IGNORECASE)
-_SET_POINT = re.compile(r"soll|set[ _-]?(point|value|temp)|target|consigne|设定", re.IGNORECASE)
+_SET_POINT = re.compile(r"\bs[pv]\b|soll|set[ _-]?(point|value|temp)|target|consigne|设定", re.IGNORECASE)
+_OWN = re.compile(
+    r"die|coil|gyr|fog|sensor|imu|spule|kreisel|^t(emp(erature?)?)?$|陀螺|线圈|光纤", re.IGNORECASE
+)
+"""Of a thermometer's name that puts it in the gyro, or nowhere."""
+_NO_OUTPUT = re.compile(r"std|dev|sigma|rms|var|noise|err|min|max|cmd|command|table|turntable", re.IGNORECASE)
+"""Of a gyro's name that tells of something about its output, or of another's rate."""
+_MULTIPLE = re.compile(
+    r"[x*×·]\s?10+\b|/\s?10+\b|(?<![a-z\d.])(?:1?e-?\d|10\^-?\d|0\.0*1)(?!\d)", re.IGNORECASE
+)
+"""What a name or unit says of numbers that are multiplied: x100, 1e-3, 0.1."""
 _AXIS = re.compile(r"([xyz])\W*\Z", re.IGNORECASE)
 _UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
 _UNITS = {unit: conversion("time", unit, "")[0] for unit in ("s", "ms", "us", "ns")}
@@ -83,7 +93,8 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     # One called so is it, though something be wrong with its values, which the import tells.
     gyros = _taken(left, lambda f: f.name == "gyro" or f.name.startswith("gyro_"))
     gyros = gyros or [f for f in left if f.name == "gyro"]
-    gyros = gyros or _taken(left, lambda f: bool(_GYRO.search(f.name)) and not _DATE.search(f.name))
+    gyros = gyros or _taken(left, _is_called_a_gyro)
+    gyros.sort(key=lambda f: bool(_NO_OUTPUT.search(f.name)))
     left = [f for f in left if f not in gyros]
     if not gyros:
         held = [f for f in left if np.isfinite(f.numbers).any() or not f.first]
@@ -95,6 +106,8 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     axes = dict(zip("xyz", gyros, strict=True)) if in_order else axes
     many = len(gyros) > 1 and len(axes) == len(gyros)
     lines.append("  gyro: " + _gyro(gyros[0] if gyros else None, many))
+    if gyros[1:] and not many:
+        lines[-1] = _doubted(lines[-1], f"or {', '.join(as_yaml(f.source) for f in gyros[1:])}?")
     used: set[str] = set()
     warm_before = len(lines)
     of_a_run = _taken(left, lambda f: _is_of_a_run(f) and not (clock and f.name == "time"))
@@ -105,7 +118,7 @@ def _columns(fields: Sequence[Field]) -> list[str]:
             doubt = (
                 f"by the clock of column {beside[-1].source}? then write it as a file of its own and join it"
             )
-            lines[-1] += f"; {doubt}" if _MARK in lines[-1] else f"    {_MARK}{doubt}"
+            lines[-1] = _doubted(lines[-1], doubt)
     if len(lines) == warm_before and (rest := sorted((f for f in left if f not in gyros), key=_takes_few)):
         lines.append(f"  # T: {{source: {as_yaml(rest[0].source)}, unit: degC}}    # a drift model needs one")
     if many:
@@ -130,16 +143,33 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     return lines
 
 
+def _doubted(line: str, doubt: str) -> str:
+    """A line with one more reason why it is a guess."""
+    return f"{line}; {doubt}" if _MARK in line else f"{line}    {_MARK}{doubt}"
+
+
+def _entry(line: str, one: Field) -> str:
+    """The line of a field, a guess where the field's name says that its numbers are multiplied."""
+    found = _MULTIPLE.search(one.name)
+    return _doubted(line, f"its name says {found[0].strip()}: state a scale") if found else line
+
+
+def _is_called_a_gyro(one: Field) -> bool:
+    """Whether a field's name is one of a gyro, and of nothing else that a run holds."""
+    return bool(_GYRO.search(one.name)) and not _DATE.search(one.name) and column_spec(one.name) is None
+
+
 def _is_left_of(one: Field, other: Field) -> bool:
     """Whether a column stands before another one, where they are told by their places."""
     places = one.source, other.source
     return isinstance(places[0], int) and isinstance(places[1], int) and places[0] < places[1]
 
 
-def _unlike_a_gyro(one: Field) -> tuple[bool, bool, bool, int]:
-    """What speaks against a field: a thermometer's name, another unit, few values as of a state, text."""
+def _unlike_a_gyro(one: Field) -> tuple[bool, bool, bool, bool, int]:
+    """What speaks against a field: a thermometer's name, a row's number, another unit, few values, text."""
     is_warm, other = bool(_WARM.search(one.name)), one.unit is not None and not is_accepted("gyro", one.unit)
-    return is_warm, other, _takes_few(one), int(np.isnan(one.numbers).sum())
+    is_number = _grows(one) and bool(_COUNT.search(one.name))
+    return is_warm, is_number, other, _takes_few(one), int(np.isnan(one.numbers).sum())
 
 
 def _takes_few(one: Field) -> bool:
@@ -171,7 +201,8 @@ def _clock(left: list[Field]) -> list[str]:
         parts = [[f for f, kind in stamped if (kind == "date") is is_date][:1] for is_date in (True, False)]
         used = whole[:1] or [f for part in parts for f in part]
         shown = [as_yaml(f.source) for f in used]
-        others = ", ".join(as_yaml(f.source) for f, _ in stamped if f not in used)
+        timed = [f for f in left if _grows(f) and f.unit is not None and is_accepted("time", f.unit)]
+        others = ", ".join(as_yaml(f.source) for f in (*(f for f, _ in stamped), *timed) if f not in used)
         source = shown[0] if len(shown) == 1 else f"[{', '.join(shown)}]"
         doubt = f"    {_MARK}or by {others}?" if others else ""
         return [f"  time: {{source: {source}, unit: stamp}}{doubt}"]
@@ -187,7 +218,9 @@ def _clock(left: list[Field]) -> list[str]:
     one = growing[0]
     left.remove(one)
     if one.unit is not None and is_accepted("time", one.unit):
-        return [f"  time: {{source: {as_yaml(one.source)}, unit: {as_yaml(one.unit)}}}"]
+        line = _entry(f"  time: {{source: {as_yaml(one.source)}, unit: {as_yaml(one.unit)}}}", one)
+        rest = [as_yaml(f.source) for f in growing[1:] if f.name != one.name]
+        return [_doubted(line, f"or by {', '.join(rest)}?") if rest else line]
     middle = np.median(one.numbers) if one.first else np.nan
     apart = np.median(np.diff(one.numbers)) if len(one.first) > 1 else np.nan
     is_date = _DATE.search(f"{one.source} {one.name}") or apart < _LEAST_STEP
@@ -202,7 +235,8 @@ def _clock(left: list[Field]) -> list[str]:
         ms = f", or {duration(apart / 1000.0)} if they are ms" if unit == "s" and apart > 1.0 else ""
         lasts = duration(apart * _UNITS[unit])
         step = f"steps of {apart:.6g}{f': {lasts}{ms}' if ms or unit != 's' else ''}; "
-    return [f"  time: {{source: {as_yaml(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"]
+    line = f"  time: {{source: {as_yaml(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"
+    return [_entry(line, one)]
 
 
 def _parts_of_a_clock(fields: Sequence[Field]) -> Sequence[Field]:
@@ -226,7 +260,7 @@ def _gyro(one: Field | None, many: bool) -> str:
         return f"{{source: GYRO, unit: deg/h}}    {_MARK}no column looks like a gyro; name it"
     source = "" if many else f"source: {as_yaml(one.source)}, "
     if one.unit is not None and is_accepted("gyro", one.unit):
-        return f"{{{source}unit: {as_yaml(one.unit)}}}"
+        return _entry(f"{{{source}unit: {as_yaml(one.unit)}}}", one)
     values = one.numbers
     degree = r"(?:deg|[°º˚])(?:_?p(?:er)?)?[/_ ]?"
     hints = (
@@ -241,7 +275,7 @@ def _gyro(one: Field | None, many: bool) -> str:
         unit, why = "count", "whole numbers; with 'scale: 1/K' it may be deg/s or deg/h"
     else:
         why = f"the file says '{one.unit}': state a scale" if one.unit else "the file states no unit"
-    return f"{{{source}unit: {unit or 'deg/s'}}}    {_MARK}{why}"
+    return _entry(f"{{{source}unit: {unit or 'deg/s'}}}    {_MARK}{why}", one)
 
 
 def _other(one: Field, face: str | None, used: set[str]) -> str:
@@ -250,20 +284,21 @@ def _other(one: Field, face: str | None, used: set[str]) -> str:
     named = [name for name in (one.name, face) if name is not None and column_spec(name) is not None]
     name = next(n for n in [*named, *others] if n not in used)
     guessed = "of the coil's face? else T_case or T_chamber" if name == face != one.name else None
-    if name not in (*named, "T"):
-        guessed = "a sensor of the coil? else T_case, T_chamber or another name"
+    if name not in named and (name != "T" or not _OWN.search(one.name)):
+        where = "the gyro's own" if name == "T" else "a sensor of the coil"
+        guessed = f"{where}? else T_case, T_chamber or another name"
     used.add(name)
     spec = column_spec(name)
     assert spec is not None
     if one.unit is not None and is_accepted(name, one.unit):
         doubt = f"    {_MARK}{guessed}" if guessed else ""
-        return f"  {name}: {{source: {as_yaml(one.source)}, unit: {as_yaml(one.unit)}}}{doubt}"
+        return _entry(f"  {name}: {{source: {as_yaml(one.source)}, unit: {as_yaml(one.unit)}}}{doubt}", one)
     values = one.numbers
     warm = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
     unit = "K" if spec.internal == "degC" and warm > _KELVIN else spec.internal
     entry = f"  {name}: {{source: {as_yaml(one.source)}, unit: {unit}}}"
     doubt = f", the file says '{one.unit}': state a scale" if one.unit else ", and is the unit right?"
-    return f"{entry}    {_MARK}which sensor{doubt}"
+    return _entry(f"{entry}    {_MARK}which sensor{doubt}", one)
 
 
 def _taken(left: list[Field], is_one: Callable[[Field], bool]) -> list[Field]:

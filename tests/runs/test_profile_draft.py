@@ -276,7 +276,7 @@ ODD = {
         "time [s],gyro [deg/h],T [degC]\n"
         + "".join(f"{i},{g},{20 + i}\n" for i, g in enumerate(VALUES))
         + "Mean,9.8,50\n,0.2,17\n",
-        "the lines below the data: left out",
+        "lines within or below the data: left out",
     ),
     "days in a column of times": (
         "Time;gyro [deg/h];T [degC]\n"
@@ -382,7 +382,7 @@ def test_a_set_point_is_no_reading_and_a_second_thermometer_is_a_guess(tmp_path)
     draft = draft_profile(tmp_path / "log.csv").splitlines()
     assert next(line for line in draft if "Omega" in line).startswith("  gyro:")
     assert next(line for line in draft if "Sollwert" in line).startswith("# keep")
-    assert ["GUESS" in line for line in draft if "Istwert" in line or "Halter" in line] == [False, True]
+    assert ["GUESS" in line for line in draft if "Istwert" in line or "Halter" in line] == [True, True]
 
 
 def test_a_remark_with_a_date_is_no_header(tmp_path):
@@ -464,3 +464,43 @@ def test_a_number_of_the_row_is_no_clock_and_a_unit_that_is_not_known_is_told(tm
     draft = draft_profile(tmp_path / "log.csv")
     assert "sample_s: 0.01    # GUESS: no clock" in draft and "T_in: {source: T_inner, unit: degC}" in draft
     assert "GUESS: which sensor, the file says 'm°C': state a scale" in draft
+
+
+@pytest.mark.parametrize(
+    ("header", "line"),
+    [
+        (
+            "time [s],gyro1 [deg/h],gyro2 [deg/h],T [degC]",
+            'gyro: {source: "gyro1 [deg/h]", unit: deg/h}    # GUESS: or',
+        ),
+        (
+            "time [s],gyro std [deg/h],gyro mean [deg/h],T [degC]",
+            'gyro: {source: "gyro mean [deg/h]", unit: deg/h}    #',
+        ),
+        (
+            "time [s],Table rate [deg/s],IMU rate [deg/s],T [degC]",
+            'gyro: {source: "IMU rate [deg/s]", unit: deg/s}\n',
+        ),
+        ("time [s],fog x1000 [deg/h],b,T [degC]", "# GUESS: its name says x1000: state a scale"),
+        (
+            "time [s],gyro [deg/h],b,Oven [degC]",
+            'T: {source: "Oven [degC]", unit: degC}    # GUESS: the gyro\'s own?',
+        ),
+        ("time [s],gyro [deg/h],SP [degC],PV [degC]", 'T: {source: "PV [degC]", unit: degC}    # GUESS'),
+        ("Record,time [s],101 (VDC),T [degC]", 'gyro: {source: "101 (VDC)", unit: deg/s}    # GUESS'),
+        ("time [s],gyro [deg/h],b,Ch2 °C", 'T: {source: "Ch2 °C", unit: degC}    # GUESS'),
+        ("tick,gyro [deg/h],b,T [degC]", "time: {source: tick, unit: s}    # GUESS"),
+    ],
+)
+def test_what_could_be_another_column_is_a_guess(tmp_path, header, line):
+    rows = "".join(f"{i},{i},{i * i % 37}.5,{25 + i / 100}\n" for i in range(COUNT))
+    if not header.startswith("Record"):
+        rows = "".join(f"{i},{i * i % 31}.25,{i * i % 37}.5,{25 + i / 100}\n" for i in range(COUNT))
+    (tmp_path / "a.csv").write_text(f"{header}\n{rows}", encoding="utf-8")
+    assert line in draft_profile(tmp_path / "a.csv")
+
+
+def test_two_clocks_are_a_guess(tmp_path):
+    rows = "".join(f"2026-03-11 08:00:{i:02d}.1,{i},{i * i % 37}.5\n" for i in range(COUNT))
+    (tmp_path / "a.csv").write_text(f"PC time,DAQ time [s],gyro [deg/h]\n{rows}")
+    assert '# GUESS: or by "DAQ time [s]"?' in draft_profile(tmp_path / "a.csv")
