@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from zlib import crc32
 
 import numpy as np
 from pydantic import Field, with_config
@@ -19,6 +20,7 @@ from fogml.features.slices import SavedSlices
 from fogml.models.box import slices_of
 from fogml.runs.run import Run
 from fogml.runs.thermometers import SavedLimits, saved_limits, trained_limits
+from fogml.signals import large
 from fogml.strict import CONTENT
 
 
@@ -43,11 +45,11 @@ class TrainingCard:
     gyro_unit
         Unit in which the output was recorded, ``deg/h`` or ``count``.
     runs
-        The training runs.
+        The training runs, by name.
     fogml_version
         Version that fitted the model.
     sample_s
-        Median sample interval of the first training run [s].
+        Shortest of the training runs' median sample intervals [s].
     earth_known
         Whether Earth rate was known, and so is no part of the drift.
     rows
@@ -105,13 +107,14 @@ def training_card(
     """
     if features is not None:
         features.thermometer = trained_limits(runs, features.sensors)
+    recorded = [TrainingRun(run.name, digest) for run, digest in zip(runs, hashes(), strict=True)]
     return TrainingCard(
         unit=_common(run.facts.unit for run in runs),
         axis=_common(run.facts.axis for run in runs),
         gyro_unit=runs[0].gyro_unit,
-        runs=tuple(TrainingRun(run.name, digest) for run, digest in zip(runs, hashes(), strict=True)),
+        runs=tuple(sorted(recorded, key=attrgetter("name", "sha256"))),
         fogml_version=fogml.__version__,
-        sample_s=runs[0].sample_s,
+        sample_s=min(run.sample_s for run in runs),
         earth_known=runs[0].earth_known,
         rows=rows,
         box=features.box if features is not None else {},
@@ -155,6 +158,8 @@ def runs_of(given: Run | Sequence[Run]) -> tuple[Run, ...]:
 def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
     """Training runs as a tuple, of one unit and axis, and either all or none with known Earth rate.
 
+    They come in an order by what they hold, so that the order in which they are given decides no model.
+
     Raises
     ------
     InputError
@@ -184,7 +189,15 @@ def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
             f"{without.name}: latitude and input_axis are not stated, but they are for {known[0].name}; "
             "state them for every training run or for none, or Earth rate is drift in some and not in others"
         )
-    return group
+    return tuple(sorted(group, key=_content))
+
+
+def _content(run: Run) -> tuple[int, int]:
+    """What orders runs: number of samples, and a checksum of the output."""
+    checksum = 0
+    for part in large.pieces(run.gyro):
+        checksum = crc32(np.ascontiguousarray(run.gyro[part]).data, checksum)
+    return len(run), checksum
 
 
 def check_unit_and_axis(card: TrainingCard, run: Run, any_unit: bool) -> tuple[str, ...]:

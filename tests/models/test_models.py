@@ -193,7 +193,7 @@ def test_clone_of_a_fitted_model_is_unfitted(train):
 def test_card_tells_where_the_model_comes_from(train, other):
     card = make_model("polynomial").fit([train, other]).card_
     assert (card.unit, card.axis, card.gyro_unit) == ("CHECK-1", "x", "deg/h")
-    assert [(run.name, run.sha256) for run in card.runs] == [("train", train.hash), ("other", other.hash)]
+    assert [(run.name, run.sha256) for run in card.runs] == [("other", other.hash), ("train", train.hash)]
     assert card.earth_known and card.sample_s == 1.0 and card.rows == len(train) + len(other) - 2 * 16
 
 
