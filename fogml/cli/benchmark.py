@@ -62,7 +62,7 @@ class RunSettings(RoundSettings):
         "Drift: a model's name; diagnosis: a method of 'blind run'; or module:function. Repeatable.",
         "--method",
         metavar="NAME",
-        known="fogml.models.names:MODEL_NAMES",
+        known="fogml.models.names:model_names",
         needed="no method is given; name one: --method auto",
     )
     features: options.Features = None

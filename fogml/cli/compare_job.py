@@ -44,15 +44,16 @@ def compare_and_write(settings: CompareSettings, terminal: Terminal, check: Chec
 
 def _makers(settings: CompareSettings) -> dict[str, partial]:
     """Name to the maker of each model; an unknown name is an error before any run is read."""
-    from fogml.models.names import MODEL_NAMES, make_model
+    from fogml.models.names import MODEL_NAMES, make_model, model_names
 
     names: list[str] = []
     for name in settings.models:
-        names += MODEL_NAMES if name == "all" else [name]
+        names += model_names() if name == "all" else [name]
     makers = {}
     for name in names:
         # Models of a document's own form keep their columns; features are for the others.
-        features = settings.features if name in _OWN_CHOICE or "." in name else None
+        chosen = name in _OWN_CHOICE or name not in MODEL_NAMES
+        features = settings.features if chosen else None
         makers[name] = partial(make_model, name, features, settings.seed)
         makers[name]()
     return makers

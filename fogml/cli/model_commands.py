@@ -76,7 +76,7 @@ class CompareSettings(options.LimitSettings):
         'Names with commas between, or "all".',
         metavar="NAME,...",
         as_text=True,
-        known="fogml.models.names:MODEL_NAMES",
+        known="fogml.models.names:model_names",
     )
     features: options.Features = None
     axis: options.Axis = None

@@ -94,7 +94,7 @@ _TESTS = option(
 Tests = Annotated[list[str], replace(_TESTS, needed="no test run is given; name at least one after --test")]
 TestsIfAny = Annotated[list[str], _TESTS]
 LOST_MODEL = "no such folder; name the one that 'fogml train' wrote the model into, e.g. DIR/model"
-Model = Annotated[str, option("Name of the model.", metavar="NAME", known="fogml.models.names:MODEL_NAMES")]
+Model = Annotated[str, option("Name of the model.", metavar="NAME", known="fogml.models.names:model_names")]
 Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".', metavar="FEATURES")]
 Parameters = Annotated[
     dict[str, Any],

@@ -13,6 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from fogml import __version__
+from fogml.entry_points import others
 from fogml.errors import printable
 
 _FRAMES = 50
@@ -29,7 +30,19 @@ def report_unexpected(error: BaseException, arguments: Sequence[str]) -> str:
     line = f"fogml: unexpected error ({type(error).__name__}{': ' if text else ''}{text})"
     path = _written(_report(error, arguments), arguments)
     where = f"report written to {path}" if path else "no report could be written"
+    if (package := _raised_by(error)) is not None:
+        return (
+            f"{line} in {package}, which is no part of fogml: {where}; please send it to the makers of "
+            f"{package}: the checks of fogml.testing say what is expected of what it adds"
+        )
     return f"{line}: {where}; please send it to the authors"
+
+
+def _raised_by(error: BaseException) -> str | None:
+    """The package of others that adds to fogml and whose code an error came through; None for none."""
+    added = others()
+    through = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
+    return next((added[top] for name in through if (top := name.partition(".")[0]) in added), None)
 
 
 def _report(error: BaseException, arguments: Sequence[str]) -> str:

@@ -111,9 +111,10 @@ def _traced(atom: Atom, writer: Writer) -> Any:
     """What a function makes of a symbol; None where it takes none."""
     assert isinstance(atom.declared, Function)
     try:
-        return traced.traced(atom.declared.function, Symbol(writer, "x"), *atom.given)
+        found = traced.traced(atom.declared.function, Symbol(writer, "x"), *atom.given)
     except InputError:
         return None
+    return found if isinstance(found, Symbol) or np.ndim(found) == 0 else None
 
 
 def _function(plan: Plan, atom: Atom, make: Callable[[], Writer]) -> dict[str, Any]:

@@ -30,11 +30,11 @@ from __future__ import annotations
 from itertools import product as all_products
 from math import prod
 
-from fogml.errors import quoted
+from fogml.errors import known_are, quoted
 from fogml.features.atoms import Atom
 from fogml.features.operands import OperandReader
 from fogml.features.operators import DEFAULT_WINDOW, Window
-from fogml.features.own import METHODS, own_operator, own_window
+from fogml.features.own import METHODS, operator_names, own_operator, own_window, window_names
 from fogml.features.signal import Signal
 from fogml.features.terms import Term
 from fogml.runs.columns import is_temperature
@@ -74,6 +74,11 @@ class _Parser(OperandReader):
             if self.token.kind == "end":
                 return tuple(terms)
             if self.take(",") is None:
+                before = self.tokens[self.next - 1]
+                if self.token.text == "(" and before.kind == "name":
+                    known = known_are(before.text, operator_names(), "operators")
+                    hint = f"{known}, and those of packages that are installed"
+                    self.fail(f"there is no operator {quoted(before.text)}", before.at, hint)
                 self.fail(f"unexpected {self.found()}", self.token.at, "features are separated by commas")
 
     def product(self, most: int) -> list[Term]:
@@ -204,7 +209,7 @@ class _Parser(OperandReader):
         if token.kind == "number":
             return Window("block", self.length())
         if token.kind != "name" or (token.text not in METHODS and own_window(token.text) is None):
-            hint = f"known methods: {', '.join(METHODS)}; e.g. dT[block, 64 s]"
+            hint = f"known methods: {', '.join(window_names())}; e.g. dT[block, 64 s]"
             self.fail(f"a method or a window expected, found {self.found()}", token.at, hint)
         self.next += 1
         method = token.text

@@ -18,19 +18,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from inspect import signature
 from types import ModuleType
 from typing import Literal, get_args
 
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
+from fogml.entry_points import OPERATORS as GROUP
 from fogml.entry_points import loaded, origin
-from fogml.errors import InputError
+from fogml.errors import FogmlError, InputError, counted, first_line
 from fogml.signals.clock import EXPONENTIAL_SPAN, check_window, longest_gap_s, needed_s
 from fogml.signals.kernel_windows import Kernel
 from fogml.signals.memory import MemoryOperator
 
-GROUP = "fogml.operators"
 Method = Literal["block", "slope", "exp", "first"]
 METHODS: tuple[Method, ...] = get_args(Method)
 """How differences and rates are taken, of those that ship."""
@@ -73,6 +74,23 @@ class _Named:
                 f"operator {self.name}: kinds of parameters are {', '.join(KINDS)}, not {unknown}"
             )
 
+    def _check_takes(self, what: str, function: object, values: int) -> None:
+        """Hold that a function takes as many values: its own, and one for each parameter."""
+        count = values + len(self.parameters)
+        if not callable(function):
+            raise InputError(f"operator {self.name}: {what} is {function!r}, not a function")
+        try:
+            taken = signature(function)
+        except ValueError:  # of compiled functions it need not be told
+            return
+        try:
+            taken.bind(*[None] * count)
+        except TypeError:
+            raise InputError(
+                f"operator {self.name}: {what} takes {taken}; it gets {counted(values, 'value')} and "
+                f"{counted(len(self.parameters), 'parameter')}"
+            ) from None
+
 
 @dataclass(frozen=True, kw_only=True)
 class Function(_Named):
@@ -91,6 +109,10 @@ class Function(_Named):
     function: Callable[..., FloatArray]
     rest: float | None = None
     inverse: Callable[..., float] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._check_takes("function", self.function, 1)
 
     def operator(self, parameters: State, sample_s: float) -> FunctionOperator:
         """What takes samples in order."""
@@ -133,6 +155,12 @@ class Recursion(_Named):
     follows: bool = False
     quicker: Callable[..., MemoryOperator] | None = None
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for what, values in (("start", 1), ("step", 4), ("value", 2), ("settled", 2)):
+            if (function := getattr(self, what)) is not None or what != "settled":
+                self._check_takes(what, function, values)
+
     def operator(self, parameters: State, sample_s: float) -> MemoryOperator:
         """What takes samples in order."""
         if self.quicker is not None:
@@ -152,7 +180,11 @@ class FunctionOperator:
 
     def push(self, time: FloatArray, x: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Values at the next samples, and where they are settled; both of shape (n,)."""
-        values = np.asarray(self._declared.function(x, *self._parameters), dtype=np.float64)
+        found = np.asarray(self._declared.function(x, *self._parameters))
+        if np.iscomplexobj(found) or found.shape not in ((), x.shape):
+            given = "complex numbers" if np.iscomplexobj(found) else f"shape {found.shape}"
+            raise TypeError(f"numbers of shape {x.shape} were expected of its function, not {given}")
+        values = found.astype(np.float64, copy=False)
         return np.broadcast_to(values, x.shape), np.ones(len(x), dtype=np.bool_)
 
 
@@ -195,13 +227,19 @@ def taken_in(
     Raises
     ------
     InputError
-        If it makes no number of a sample, as a wave of period 0 does.
+        If it makes no number of a sample, as a wave of period 0 does, or raises.
     """
     try:
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             values, settled = operator.push(time, x)
+    except FogmlError:
+        raise
     except (ArithmeticError, ValueError) as error:
         raise InputError(f"{text} can't be worked out ({error}); state other numbers in it") from None
+    except Exception as error:  # others' code raises whatever it likes
+        raise InputError(
+            f"{text} can't be worked out: {type(error).__name__} ({first_line(error)})"
+        ) from None
     if not (finite := np.isfinite(values)).all():
         at = int(np.argmin(finite))
         raise InputError(
@@ -235,6 +273,16 @@ def own_operator(name: str) -> Function | Recursion | None:
     """The operator of a name; None for none."""
     found = _known().get(name)
     return None if isinstance(found, Kernel) else found
+
+
+def operator_names() -> tuple[str, ...]:
+    """Names that feature text calls with parentheses: those that ship, and one's own."""
+    return (*FUNCTIONS, *(name for name, found in _known().items() if not isinstance(found, Kernel)))
+
+
+def window_names() -> tuple[str, ...]:
+    """Names of windows: those that ship, and one's own."""
+    return (*METHODS, *(name for name, found in _known().items() if isinstance(found, Kernel)))
 
 
 def own_window(name: str) -> Kernel | None:

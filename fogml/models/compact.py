@@ -14,6 +14,7 @@ from fogml.errors import InputError
 from fogml.features.atoms import Atom
 from fogml.features.operators import ring_of
 from fogml.features.terms import Step
+from fogml.models.others_code import compact_by
 from fogml.models.regressors import goes_on_linearly, own_regressors
 
 if TYPE_CHECKING:
@@ -56,8 +57,7 @@ def affine(linear: ArrayLike, constant: float) -> Network:
 def network_of(regressor: Any) -> Network | None:
     """A fitted regressor in the compact form, exactly; None where it has none, as trees have."""
     if hasattr(regressor, "compact"):
-        network: Network = regressor.compact()
-        return network
+        return compact_by(regressor)
     from fogml.models.sklearn_compact import network_of_sklearn
 
     return network_of_sklearn(regressor)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from fogml.errors import InputError, known_are
@@ -67,29 +68,36 @@ def make_model(
         One of `MODEL_NAMES`, a scikit-learn regressor by its dotted name, or one that an installed package
         declares (`fogml.models.regressors`) by its name there.
     features
-        Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent``, ``mixed-effects`` and
-        dotted names; for ``joint`` of those that the bias depends on besides its own.
+        Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent``, ``mixed-effects``, dotted
+        names and a package's; for ``joint`` of those that the bias depends on besides its own.
     seed
-        Seed of whatever is random.
+        Seed of whatever is random; a package's regressor gets it where it takes ``seed`` or ``random_state``.
     parameters
-        Parameters of the regressor, for ``polynomial``, ``rbf``, ``rbf-patent`` and dotted names, e.g.
-        ``{"ridge": 1e-4}`` or ``{"centres": 16}``.
+        Parameters of the regressor, for ``polynomial``, ``rbf``, ``rbf-patent``, dotted names and a
+        package's, e.g. ``{"ridge": 1e-4}`` or ``{"centres": 16}``.
 
     Raises
     ------
     InputError
         If the name is not known, or features or parameters are stated for a model that fixes its own.
     """
-    if "." not in name and name not in MODEL_NAMES:
-        from fogml.models.regressors import own_regressor, own_regressors
+    from fogml.models.others_code import asked
+    from fogml.models.regressors import own_regressor, own_regressors
+    from fogml.models.scikit_learn import clone
 
-        if name not in own_regressors():
-            raise InputError(_unknown(name))
-        return _of_features(own_regressor(name), name, features or RBF_FEATURES, parameters or {})
+    if name in own_regressors():
+        own = own_regressor(name)
+        with asked(own, "can't be made and cloned"):
+            return clone(
+                _of_features(own, name, features or RBF_FEATURES, _seeded(own, parameters or {}, seed))
+            )
+    if "." not in name and name not in MODEL_NAMES:
+        raise InputError(_unknown(name))
     if parameters and "." not in name and name not in PARAMETRIC:
+        takers = ", ".join((*PARAMETRIC, *own_regressors()))
         raise InputError(
             f"model '{name}' takes no parameters (found '{next(iter(parameters))}'); models that do are "
-            f"{', '.join(PARAMETRIC)} and scikit-learn's regressors by their dotted names"
+            f"{takers} and scikit-learn's regressors by their dotted names"
         )
     if "." in name:
         from fogml.models.sklearn_model import SklearnModel
@@ -130,6 +138,19 @@ def make_model(
     return MeanModel() if name == "mean" else NoCompensation()
 
 
+def model_names() -> tuple[str, ...]:
+    """`MODEL_NAMES`, and those of regressors that installed packages declare."""
+    from fogml.models.regressors import own_regressors
+
+    return (*MODEL_NAMES, *own_regressors())
+
+
+def _seeded(regressor: Any, parameters: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """Parameters with the seed beside them, under the name that the regressor has for it."""
+    takes = signature(regressor).parameters
+    return {name: seed for name in ("seed", "random_state") if name in takes} | dict(parameters)
+
+
 def _linear(kind: str, features: str, parameters: Mapping[str, Any]) -> DriftModel:
     from fogml.models.linear import LinearRegressor
 
@@ -162,10 +183,7 @@ def _understood(features: str) -> str:
 
 
 def _unknown(name: str) -> str:
-    from fogml.models.regressors import own_regressors
-
-    known = (*MODEL_NAMES, *own_regressors())
     return (
-        f"model '{name}' is not known; {known_are(name, known)}, "
+        f"model '{name}' is not known; {known_are(name, model_names())}, "
         "or a scikit-learn regressor by its dotted name, e.g. sklearn.svm.SVR"
     )

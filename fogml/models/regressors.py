@@ -37,10 +37,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray
+from fogml.entry_points import REGRESSORS as GROUP
 from fogml.entry_points import loaded, origin
-from fogml.errors import FogmlError, InputError, first_line, quoted
+from fogml.errors import InputError, quoted
 from fogml.features.features import Features
 from fogml.models.folds import FOLDS
+from fogml.models.names import MODEL_NAMES
+from fogml.models.others_code import asked, fitted_to, predicted, saved_by
 from fogml.models.parameters import expect_arrays
 from fogml.models.scikit_learn import clone
 from fogml.models.table import TrainingTable
@@ -53,14 +56,24 @@ FORMS = {
 """Forms of saved regressors, and where their classes are."""
 SKOPS = "skops"
 _PREDICTED_ROWS = 4096
-GROUP = "fogml.regressors"
 _NEEDED = ("fit", "predict", "to_saved", "from_saved", "get_params", "set_params")
 
 
 @cache
 def own_regressors() -> dict[str, EntryPoint]:
-    """The entry points of regressors that installed packages declare, by name; nothing is loaded yet."""
-    return {point.name: point for point in entry_points(group=GROUP)}
+    """The entry points of regressors that installed packages declare, by name; nothing is loaded yet.
+
+    Raises
+    ------
+    InputError
+        If two packages have one name.
+    """
+    found: dict[str, EntryPoint] = {}
+    for point in entry_points(group=GROUP):
+        other = found.setdefault(point.name, point)
+        if other is not point:
+            raise InputError(f"{origin(point)} in group '{GROUP}': {origin(other)} has this name already")
+    return found
 
 
 def own_regressor(name: str) -> Any:
@@ -73,7 +86,7 @@ def own_regressor(name: str) -> Any:
     """
     point = own_regressors()[name]
     place = f"{origin(point)} in group '{GROUP}'"
-    if name in FORMS or name == SKOPS:
+    if name in FORMS or name in MODEL_NAMES or name == SKOPS:
         raise InputError(f"{place}: '{name}' is a regressor of fogml's own; the package has to name another")
     kind = loaded(point)
     lacking = [each for each in _NEEDED if not hasattr(kind, each)]
@@ -102,17 +115,13 @@ def fit_regressor(regressor: Any, table: TrainingTable) -> Any:
     InputError
         If the rows are none that it can be fitted to: too few, as a rule.
     """
-    asked = inspect.signature(regressor.fit).parameters
+    takes = inspect.signature(regressor.fit).parameters
     told = {
         "groups": table.run_index,
         "time": table.time_s,
         "folds": table.block % FOLDS,
     }
-    try:
-        return regressor.fit(table.X, table.y, **{name: told[name] for name in told if name in asked})
-    except ValueError as error:
-        name = type(regressor).__name__
-        raise InputError(f"{name}: can't be fitted to these runs: {first_line(error)}") from None
+    return fitted_to(regressor, table.X, table.y, {name: told[name] for name in told if name in takes})
 
 
 def refit(regressor: Any, table: TrainingTable) -> Any:
@@ -134,13 +143,8 @@ def predict_rows(regressor: Any, columns: FloatArray) -> FloatArray:
         return np.asarray(regressor.predict_unchecked(columns))
     # Kernel methods hold a value for each row and each training row; so few rows at a time.
     starts = range(0, len(columns), _PREDICTED_ROWS)
-    try:
-        values = [np.asarray(regressor.predict(columns[start : start + _PREDICTED_ROWS])) for start in starts]
-    except (FogmlError, MemoryError):
-        raise
-    except Exception as error:  # others' code raises whatever its parameters lead to
-        raise InputError(f"the regressor can't be applied to these runs: {first_line(error)}") from None
-    return np.concatenate(values).reshape(-1) if values else np.empty(0)
+    values = [predicted(regressor, columns[start : start + _PREDICTED_ROWS]) for start in starts]
+    return np.concatenate(values) if values else np.empty(0)
 
 
 def goes_on_linearly(regressor: Any) -> bool:
@@ -152,7 +156,8 @@ def parameter_count(regressor: Any) -> int:
     """Number of fitted parameters; of a scikit-learn regressor, of the numbers that it predicts from."""
     count = getattr(regressor, "parameter_count", None)
     if count is not None:
-        return int(count() if callable(count) else count)
+        with asked(regressor, "its parameter_count is no number"):
+            return int(count() if callable(count) else count)
     if hasattr(regressor, "to_saved"):
         return sum(array.size for array in regressor.to_saved()[1].values())
     from fogml.models.sklearn_compact import numbers_of
@@ -187,7 +192,7 @@ def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArra
         if form in FORMS:
             own_regressor(form)  # which refuses its name
     if form is not None:
-        values, arrays = regressor.to_saved()
+        values, arrays = saved_by(regressor)
         return {"form": form, **values}, arrays
     raise InputError(
         f"{type(regressor).__name__}: cannot be saved; fogml's and scikit-learn's regressors can, and those "
@@ -213,7 +218,9 @@ def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]
         expect_arrays(arrays, {"skops": (np.uint8, np.shape(arrays.get("skops", (0,))))})
         return load_sklearn(arrays["skops"])
     if isinstance(form, str) and form not in FORMS and form in own_regressors():
-        return own_regressor(form).from_saved(values, arrays)
+        kind = own_regressor(form)
+        with asked(kind, "its from_saved does not take what is stored"):
+            return kind.from_saved(values, arrays)
     if not isinstance(form, str) or form not in FORMS:
         raise InputError(
             f"regressor form {quoted(form)} is not known; known are "

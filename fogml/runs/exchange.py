@@ -10,7 +10,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.numerals import short
 from fogml.pictures import BEFORE, OTHERS, Panel, Pictured, in_time
-from fogml.runs.columns import conversion, header, is_temperature, parse_header
+from fogml.runs.columns import column_spec, conversion, header, is_temperature, parse_header
 from fogml.runs.facts import Facts
 from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.possible import as_vector
@@ -26,6 +26,7 @@ class Exchange(Pictured):
     columns: Mapping[str, Any]
     facts: Facts
     gyro_unit: str
+    hash: str
 
     @classmethod
     def from_pandas(cls, frame: pd.DataFrame, name: str = "run", facts: Facts | None = None) -> Self:
@@ -48,11 +49,24 @@ class Exchange(Pictured):
         Raises
         ------
         InputError
-            If a column is named twice, or in a unit that the run format does not take, its values are no
-            numbers, or there are no times.
+            If it is no frame or has no rows, a column is named twice, one of the run format is in a unit that
+            it does not take or holds what is no number, or there are no times. Other columns that hold no
+            numbers are left out, which ``findings`` tells.
         """
-        from fogml.runs.checks import check_run  # which takes runs
+        import pandas as pd
 
+        from fogml.runs.checks import check_run  # which takes runs
+        from fogml.runs.raw_table import text_column
+
+        if not isinstance(frame, pd.DataFrame):
+            kind = f"{type(frame).__module__.partition('.')[0]}.{type(frame).__name__}"
+            raise InputError(
+                f"{name}: a pandas DataFrame is needed, found {kind}; tables of polars and Arrow have a "
+                "method to_pandas"
+            )
+        if frame.empty:
+            raise InputError(f"{name}: the frame has no rows; rows of numbers were expected")
+        text = []
         cells = canonical_cells([str(cell) for cell in frame.columns])
         held = [(*parse_header(cell), frame.iloc[:, place]) for place, cell in enumerate(cells)]
         if "time" not in [column for column, _, _ in held]:
@@ -62,10 +76,16 @@ class Exchange(Pictured):
         for column, unit, series in held:
             if column in columns:
                 raise InputError(f"{name}: column '{column}' is there twice")
-            factor, offset = (1.0, 0.0) if unit is None else conversion(column, unit, name)
             # Of dates with a time zone pandas makes objects unless it is asked for dates.
             kind = np.dtype("M8[ns]") if series.dtype.kind == "M" else None
-            values = as_vector(name, column, series.to_numpy(kind))
+            try:
+                values = as_vector(name, column, series.to_numpy(kind))
+            except InputError:
+                if column_spec(column) is not None:
+                    raise
+                text.append(text_column(column))
+                continue
+            factor, offset = (1.0, 0.0) if unit is None else conversion(column, unit, name)
             if (factor, offset) != (1.0, 0.0) and series.dtype.kind not in "mM":  # these tell their unit
                 values = values * factor + offset
             if column == "time" and facts.started is None and series.dtype.kind == "M" and len(series):
@@ -73,7 +93,7 @@ class Exchange(Pictured):
             columns[column] = values
         is_count = ("gyro", "count") in [(column, unit) for column, unit, _ in held]
         run: Any = cls(name, columns, facts, "count" if is_count else "deg/h")  # type: ignore[call-arg]
-        noticed: Self = run.with_findings(check_run(run))
+        noticed: Self = run.with_findings((*text, *check_run(run)))
         return noticed
 
     def to_pandas(self) -> pd.DataFrame:
@@ -82,6 +102,16 @@ class Exchange(Pictured):
 
         units = {"gyro": self.gyro_unit}
         return pd.DataFrame({header(n, units.get(n)): np.array(x) for n, x in self.columns.items()})
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another run has the same name, facts and columns, number for number."""
+        if self is other or not isinstance(other, Exchange):
+            return self is other
+        same = self.name == other.name and self.facts == other.facts
+        return same and self.hash == other.hash
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.hash))
 
     def __getstate__(self) -> dict[str, Any]:
         """Columns and facts alone: what was worked out from them is worked out anew."""

@@ -31,6 +31,8 @@ from fogml.signals.clock import (
 from fogml.signals.windows import Windowed
 
 _CHUNK = 1 << 22
+LARGEST = 1e100
+"""Size of a weight, above which sums of products with temperatures may overflow."""
 _LEAST_MOMENT = 1e-6
 _MANY, _LEAST_ROWS = 8, 4096
 # Samples between two knots from which on running sums are quicker; rows that share theirs.
@@ -54,9 +56,13 @@ class Kernel:
     def __post_init__(self) -> None:
         if not (self.name.isidentifier() and self.name.isascii()):
             raise InputError(f"window '{self.name}': a name of letters, digits and _ was expected")
-        object.__setattr__(self, "weights", tuple(float(weight) for weight in self.weights))
-        size = max(map(abs, self.weights), default=0.0)
-        if len(self.weights) < 2 or not 0.0 < size < np.inf or self.moment <= _LEAST_MOMENT * size:
+        try:
+            object.__setattr__(self, "weights", tuple(float(weight) for weight in self.weights))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"window {self.name}: its weights are no numbers: {error}") from None
+        size = float(np.max(np.abs(self.weights), initial=0.0))
+        told = len(self.weights) > 1 and 0.0 < size < LARGEST
+        if not told or not self.moment > _LEAST_MOMENT * size:
             raise InputError(
                 f"window {self.name}: weights by age were expected that fall from now to the window's end, "
                 "so that they tell a rate"

@@ -297,9 +297,13 @@ def signature(effect: Effect, inputs: Inputs, shape: Mapping[str, float]) -> Flo
 
 def in_block(effect: Effect, inputs: Inputs, shape: Mapping[str, float]) -> FloatArray:
     """The same on a block, with the memory that it brings along."""
-    if isinstance(effect, NoiseEffect):
-        return np.broadcast_to(effect.strength(inputs, **shape), (len(inputs),)).astype(np.float64)
-    return effect.signature(inputs, **shape)
+    try:
+        if isinstance(effect, NoiseEffect):
+            return np.broadcast_to(effect.strength(inputs, **shape), (len(inputs),)).astype(np.float64)
+        return effect.signature(inputs, **shape)
+    except Exception as error:  # others' code raises whatever it likes
+        held = f"{len(inputs)} rows with {', '.join(inputs.temperatures)}"
+        raise AssertionError(f"{effect.id}: {type(error).__name__} ({error}) on {held}") from error
 
 
 def same(wanted: FloatArray, found: FloatArray, what: str, *, agreement: float = AGREEMENT) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.gap.catalogue import FAMILIES
 from fogml.numerals import percent
 from fogml.testing.effect_inputs import (
     BLOCK_EDGES,
@@ -32,7 +33,7 @@ from fogml.twin import registry
 from fogml.twin.effect import SET_UP, STAGES, Effect, NoiseEffect, ThermalEffect
 from fogml.twin.inputs import REST, STAND_INS, Inputs
 from fogml.twin.memory import Memory
-from fogml.twin.quantities import GRADES
+from fogml.twin.quantities import GRADES, Quantity
 from fogml.twin.scenes import scene_names
 
 _WORD = re.compile(r"[a-z]{2,}(_[a-z]{2,})*\Z")
@@ -44,6 +45,8 @@ def check_declaration(effect: Effect) -> None:
     for attribute in ("code", "title", "stage", "amplitude"):
         assert hasattr(effect, attribute), f"{name} does not state '{attribute}'"
     assert effect.title.strip() and effect.code.strip(), f"{name}: title or letter code is empty"
+    for quantity in (effect.amplitude, *effect.shape):
+        assert isinstance(quantity, Quantity), f"{name}: {quantity!r} is no Quantity"
     assert effect.stage in STAGES, f"{name}: stage '{effect.stage}' is none of {', '.join(STAGES)}"
     text = type(effect).__doc__ or ""
     assert "=" in text and "::" in text, f"{name}: the docstring states no equation after '::'"
@@ -53,6 +56,11 @@ def check_declaration(effect: Effect) -> None:
     assert effect.shown_on in scene_names(), f"{name} is shown on '{effect.shown_on}', which is no scene"
     for other, what in effect.confused_with.items():
         assert other != effect.id and what.strip(), f"{name}: confused_with '{other}' says nothing"
+    there = {*registry.effects(), effect.id}
+    for other in (*effect.confused_with, *effect.conflicts):
+        assert other in there, f"{name}: confused_with or conflicts name '{other}', which is no effect"
+    families = ("signature", *FAMILIES)
+    assert effect.family in families, f"{name}: family '{effect.family}' is none of {', '.join(families)}"
     known = {*STAND_INS, *REST, *SET_UP}
     assert set(effect.needs) <= known, f"{name} needs {sorted(set(effect.needs) - known)}, which no input has"
     assert len(set(effect.needs)) == len(effect.needs), f"{name}: needs repeat"

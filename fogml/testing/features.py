@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.arrays import FloatArray
+from fogml.errors import InputError
 from fogml.features.features import Features
+from fogml.features.own import Recursion
 from fogml.features.parse import parse_features
 from fogml.features.signal import NOT_INPUTS, TIME_ON
+from fogml.features.traced import Symbol, Writer, traced
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 
@@ -25,7 +28,8 @@ def check_feature(features: Features | str, runs: Sequence[Run] | None = None) -
 
     The checks: parameters and text rebuild equal features; names are distinct, one per column;
     columns are finite and the input stays untouched; no value depends on later samples; sample by
-    sample and block by block give the values of the whole run; after a long gap windowed atoms are
+    sample and block by block give the values of the whole run; a recursion of one's own is written with
+    what becomes C; after a long gap windowed atoms are
     0 until their windows are full; the box comes from the given runs' full rows only, and a second
     fit finds the same; the limit leaves the inside alone and levels off without a corner beyond.
 
@@ -47,6 +51,7 @@ def check_feature(features: Features | str, runs: Sequence[Run] | None = None) -
     runs = synthetic_runs(features) if runs is None else runs
     assert len(runs) >= 2, "check_feature needs at least two runs"
     _check_parameters(features)
+    _check_written(features)
     for run in runs:
         _check_columns(features, run)
         _check_causality(features, run)
@@ -100,6 +105,33 @@ def _check_parameters(features: Features) -> None:
     assert hash(again) == hash(features), "equal features have different hashes"
     names = features.names()
     assert len(set(names)) == len(names), f"names repeat: {names}"
+
+
+def _check_written(features: Features) -> None:
+    """Recursions take symbols, and keep as many numbers as they begin with."""
+    for atom in features.atoms:
+        declared, given = atom.declared, atom.given
+        if not isinstance(declared, Recursion):
+            continue
+        begun = declared.start(20.0, *given)
+        assert isinstance(begun, tuple) and begun, f"{atom.text}: start gives {begun!r}, no tuple of numbers"
+        gone_on = declared.step(begun, 20.5, 20.0, 1.0, *given)
+        assert isinstance(gone_on, tuple) and len(gone_on) == len(begun), (
+            f"{atom.text}: step gives {gone_on!r}, no tuple of {len(begun)} numbers as start does"
+        )
+        writer = Writer("double", repr, False)
+        x, last, dt, *state = (Symbol(writer, name) for name in ("x", "last", "dt", *map(str, begun)))
+        for what, values in (
+            ("start", (x,)),
+            ("step", (tuple(state), x, last, dt)),
+            ("value", (tuple(state), x)),
+            ("settled", (tuple(state), x)),
+        ):
+            function = getattr(declared, what)
+            try:
+                traced(function, *values, *given) if function is not None else None
+            except InputError as error:
+                raise AssertionError(f"{atom.text}: {what}: {error}") from None
 
 
 def _check_columns(features: Features, run: Run) -> None:

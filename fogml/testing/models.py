@@ -14,7 +14,10 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.base import GOOD, NOT_FULL, OUTSIDE, DriftModel
+from fogml.models.compact import network_of
 from fogml.models.compensation import compensate_blocks
+from fogml.models.feature_model import FeatureModel
+from fogml.models.regressors import goes_on_linearly, predict_rows
 from fogml.models.saved import load_model, model_to_saved, save_model
 from fogml.models.scikit_learn import clone
 from fogml.runs.facts import Facts, ScaleFactor
@@ -22,6 +25,8 @@ from fogml.runs.run import Run
 
 AGREEMENT = 1e-9
 """Greatest difference between two ways to the same value, relative to the values' size."""
+EXPORTED = 1e-6
+"""The same between a regressor and its compact form."""
 _COUNT_PER_DEG_H = 2.0
 # A power of two: counts then hold the very same digits, and even a forest of trees must agree.
 _FACTS = Facts(unit="CHECK-1", axis="x", latitude=30.0, input_axis="up")
@@ -37,8 +42,8 @@ def check_model(
     sample; compensated is output less drift; flags tell windows that are not full and temperatures
     outside training, where the drift stays bounded; intervals hold the drift and grow with their
     level; counts with a stated scale factor give what deg/h gives; block by block gives what the
-    whole run gives; save and load give the same model, and a damaged file is refused; another unit
-    or axis is refused unless allowed.
+    whole run gives; save and load give the same model, and a damaged file is refused; a regressor's
+    compact form, where it has one, is what it predicts; another unit or axis is refused unless allowed.
 
     Parameters
     ----------
@@ -55,6 +60,9 @@ def check_model(
     ------
     AssertionError
         Naming the part of the contract that is not kept.
+    InputError
+        What fogml tells of a regressor that raises, writes to the table that it is given, or answers with
+        another thing than a number a row.
     """
     train = [synthetic_run("train", 1.0, turns)] if train is None else list(train)
     other = synthetic_run("other", 2.0, turns, seed=1) if other is None else other
@@ -65,6 +73,7 @@ def check_model(
     _check_counts(model, fitted, train, other)
     _check_blocks(fitted, other)
     _check_saving(fitted, other)
+    _check_compact(fitted, other)
     _check_unit_and_axis(fitted, other)
 
 
@@ -235,6 +244,21 @@ def _check_saving(model: DriftModel, other: Run) -> None:
             _refused(partial(load_model, f"{folder}/model"), f"load: {file} cut short was taken")
             with open(path, "wb") as stream:
                 stream.write(content)
+
+
+def _check_compact(model: DriftModel, other: Run) -> None:
+    regressor = getattr(model, "regressor_", None)
+    network = None if regressor is None else network_of(regressor)
+    if not isinstance(model, FeatureModel) or network is None:
+        return
+    values, full, _ = model.features_.atom_values(other)
+    limited, _ = model.features_.limit(values, full, linear=goes_on_linearly(regressor))
+    columns = model.features_.compose(limited)
+    wanted, found = predict_rows(regressor, columns), network(columns)
+    size = 1.0 + np.abs(wanted).max()
+    assert np.allclose(found, wanted, rtol=0, atol=EXPORTED * size), (
+        f"compact: up to {np.abs(found - wanted).max():.2g} deg/h from what the regressor predicts"
+    )
 
 
 def _check_unit_and_axis(model: DriftModel, other: Run) -> None:

@@ -15,12 +15,12 @@ from importlib.metadata import entry_points
 from inspect import isabstract
 from typing import Any, TypeVar
 
+from fogml.entry_points import EFFECTS as GROUP
 from fogml.entry_points import loaded, origin
 from fogml.errors import InputError, did_you_mean
 from fogml.twin.effect import STAGES, Effect
 from fogml.twin.quantities import Quantity
 
-GROUP = "fogml.effects"
 _ID = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")
 _CODE = re.compile(r"([A-Za-z]*)(\d*)")
 _Declared = TypeVar("_Declared", bound="type[Effect] | Effect")

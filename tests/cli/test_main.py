@@ -285,6 +285,17 @@ def test_what_nobody_expected_is_one_line_a_report_and_status_3(monkeypatch, tmp
     assert "Traceback" in text and fogml.__version__ in text and "command: fogml simulate --out" in text
 
 
+def test_an_error_out_of_another_package_names_it(monkeypatch, tmp_path):
+    made = {"__name__": "labkit.effects"}
+    exec("def signature(): return {}['T']", made)
+    monkeypatch.setattr("fogml.cli.unexpected.others", lambda: {"labkit": "lab-kit"})
+    use_command(monkeypatch, made["signature"])
+    result = runner.invoke(main.app, ["simulate", "--out", str(tmp_path / "out")])
+    assert result.exit_code == 3
+    assert "(KeyError: 'T') in lab-kit, which is no part of fogml" in result.stderr
+    assert "to the makers of lab-kit" in result.stderr
+
+
 def test_a_report_that_finds_no_room_beside_the_output_goes_to_the_temporary_files(monkeypatch, tmp_path):
     def action():
         raise AssertionError("a defect")

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
+from fogml.features import own
 from fogml.features.features import Features
+from fogml.features.own import Function, Recursion, declare
 from fogml.features.parse import parse_features
+from fogml.features.traced import larger
+from fogml.signals.kernel_windows import Kernel
 from fogml.testing import check_feature
 
 
@@ -91,3 +98,70 @@ def test_a_memory_that_ends_with_a_block_is_caught() -> None:
 
 def test_it_takes_features_and_text_alike() -> None:
     check_feature(parse_features("dT"))
+
+
+def begun(x: float) -> tuple[float, ...]:
+    return (x,)
+
+
+def first(state: tuple[float, ...], x: float) -> float:
+    return state[0]
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"start": lambda x: [x]}, r"start gives \[20.0\], no tuple"),
+        ({"step": lambda s, x, last, dt: (s[0], x)}, "no tuple of 1 numbers"),
+        ({"step": lambda s, x, last, dt: (max(s[0], x),)}, r"step: .*larger\(a, b\)"),
+    ],
+)
+def test_recursions_that_no_c_follows_from_are_caught(
+    changed: dict[str, Any], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: dict[str, Any] = {"start": begun, "step": lambda s, x, last, dt: (larger(s[0], x),), "value": first}
+    monkeypatch.setattr(own, "_declared", {})
+    declare(Recursion(name="most", **made))
+    check_feature("most(T)")
+    monkeypatch.setattr(own, "_declared", {})
+    declare(Recursion(name="most", **{**made, **changed}))
+    with pytest.raises(AssertionError, match=message):
+        check_feature("most(T)")
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda x: np.concatenate([x, x]), r"shape \(\d+,\) were expected of its function, not shape"),
+        (lambda x: 1j * x, "not complex numbers"),
+        (lambda x: x.nothing, "most.T. can't be worked out: AttributeError"),
+        (lambda x: "a", "could not convert"),
+    ],
+)
+def test_functions_that_make_no_numbers_are_named(
+    function: Any, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(own, "_declared", {})
+    declare(Function(name="most", function=function))
+    with pytest.raises(InputError, match=message):
+        check_feature("most(T)")
+
+
+def test_functions_of_another_number_of_values_are_refused_where_they_are_declared() -> None:
+    with pytest.raises(InputError, match=r"fewer: function takes \(x, w\); it gets 1 value and 0 parameters"):
+        Function(name="fewer", function=lambda x, w: x)
+    with pytest.raises(InputError, match=r"step takes .*; it gets 4 values and 1 parameter"):
+        Recursion(
+            name="fewer",
+            parameters=("s",),
+            start=lambda x, tau: (x,),
+            step=lambda s, x, last, dt: (x,),
+            value=lambda s, x, tau: x,
+        )
+    with pytest.raises(InputError, match="function is 3, not a function"):
+        Function(name="fewer", function=3)  # type: ignore[arg-type]
+    for weights in ((1.0, float("nan")), (1e308, 1e308, 1.0), ("a", 1.0)):
+        with pytest.raises(InputError, match="window fewer"):
+            Kernel("fewer", weights)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="there is no operator 'plai'"):
+        parse_features("plai(T, 3 degC)")

@@ -92,3 +92,37 @@ def test_a_name_of_fogmls_own_is_refused(tmp_path: Path, attempt: str) -> None:
     )
     told = said(tmp_path, "linear = fogml_trimmed:TrimmedRegressor", code)
     assert told.startswith("entry point 'linear' of fogml-trimmed") and TAKEN in told
+
+
+def test_compare_takes_it_among_all_and_gives_it_the_features(tmp_path: Path) -> None:
+    code = (
+        "from fogml.cli.compare_job import _makers; from fogml.cli.model_commands import CompareSettings\n"
+        "made = _makers(CompareSettings(runs=['a.csv'], features='T, dT[60 s]'))\n"
+        "print(made['trimmed']().features.text if hasattr(made['trimmed']().features, 'text') "
+        "else made['trimmed']().features)"
+    )
+    assert said(tmp_path, "trimmed = fogml_trimmed:TrimmedRegressor", code) == "T, dT[60 s]"
+
+
+def test_it_gets_the_seed_unless_one_is_stated(tmp_path: Path) -> None:
+    code = (
+        "from fogml_trimmed import TrimmedRegressor as Own\n"
+        "class Seeded(Own):\n"
+        "    def __init__(self, share=0.05, random_state=0):\n"
+        "        super().__init__(share); self.random_state = random_state\n"
+        "import fogml_trimmed; fogml_trimmed.Seeded = Seeded\n"
+        "from fogml.models.names import make_model\n"
+        "print(*(make_model('seeded', seed=7, parameters=p).regressor.random_state "
+        "for p in ({}, {'random_state': 3})))"
+    )
+    assert said(tmp_path, "seeded = fogml_trimmed:Seeded", code) == "7 3"
+
+
+def test_a_name_of_a_model_of_fogmls_own_is_refused(tmp_path: Path) -> None:
+    code = (
+        "from fogml.errors import InputError; from fogml.models.names import make_model\n"
+        "try: make_model('polynomial')\n"
+        "except InputError as error: print(error)"
+    )
+    told = said(tmp_path, "polynomial = fogml_trimmed:TrimmedRegressor", code)
+    assert told.startswith("entry point 'polynomial' of fogml-trimmed") and "has to name another" in told

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -163,6 +166,38 @@ def test_a_part_of_a_run_goes_forwards_in_time() -> None:
 def test_a_frame_that_is_no_run_is_refused(columns: dict, told: str) -> None:
     with pytest.raises(InputError, match=told):
         Run.from_pandas(pd.DataFrame(columns))
+
+
+def test_a_frames_column_of_text_is_left_out_as_a_files_is(tmp_path: Path) -> None:
+    frame = run().to_pandas().assign(note="x")
+    frame.to_parquet(tmp_path / "a.parquet")
+    made, read = Run.from_pandas(frame, "a.parquet"), read_run(tmp_path / "a.parquet")
+    assert list(made.columns) == list(read.columns) == list(run().columns)
+    told = [each.message for each in read.findings if "'note'" in each.message]
+    assert told and told == [each.message for each in made.findings if "'note'" in each.message]
+    with pytest.raises(InputError, match=r"column .T_in.: holds what is no number"):
+        Run.from_pandas(frame.assign(**{"T_in [degC]": "x"}))
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (run().to_pandas()[:0], "a: the frame has no rows"),
+        (run().to_pandas()["dial"], "a pandas DataFrame is needed, found pandas.Series"),
+        ({"time": TIME}, "found builtins.dict"),
+    ],
+)
+def test_what_is_no_frame_of_rows_is_refused(given: Any, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        Run.from_pandas(given, "a")
+
+
+def test_runs_are_equal_by_what_they_hold() -> None:
+    assert run() == run() and len({run(), run()}) == 1
+    assert run() == pickle.loads(pickle.dumps(run())) == copy.deepcopy(run())
+    moved = run().with_columns(gyro=np.r_[1e-12, run().gyro[1:]])
+    elsewhere = replace(run(), facts=Facts(unit="F-1", axis="y"))
+    assert all(run() != other for other in (moved, elsewhere, replace(run(), name="b.csv"), "a.csv"))
 
 
 def test_a_pickled_run_is_the_run() -> None:

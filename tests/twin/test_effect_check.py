@@ -85,6 +85,10 @@ DECLARATIONS = {
     "shows nothing": ({"shows": " "}, "where it shows"),
     "unknown scene": ({"shown_on": "the moon"}, "which is no scene"),
     "own relative": ({"confused_with": {"sample": "itself"}}, "confused_with 'sample'"),
+    "unknown look-alike": ({"confused_with": {"no_such": "x"}}, "'no_such', which is no effect"),
+    "unknown conflict": ({"conflicts": ("no_such",)}, "'no_such', which is no effect"),
+    "unknown family": ({"family": "no_such"}, "family 'no_such' is none of signature"),
+    "amplitude no quantity": ({"amplitude": 3.0}, "3.0 is no Quantity"),
     "own conflict": ({"conflicts": ("sample",)}, "conflicts with itself"),
     "unknown need": ({"needs": ("T", "moon")}, "moon"),
     "amplitude's key": ({"amplitude": quantity(name="size")}, "key is 'amplitude'"),
@@ -118,6 +122,14 @@ SIGNATURES = {
     "not finite with one sensor": (
         at(lambda i, s: 0.0 if "T_case" in i.temperatures else np.full(len(i), np.nan)),
         "not finite everywhere on 'only T'",
+    ),
+    "raises where a sensor is not there": (
+        lambda self, i, **s: 1.0 * i.temperatures["T_case"],
+        r"sample: KeyError \('T_case'\) on \d+ rows with T$",
+    ),
+    "raises without rows": (
+        lambda self, i, **s: i.temperature("T") - i.temperature("T")[0],
+        "sample: IndexError .* on 0 rows",
     ),
     "wrong shape": (lambda self, i, **s: np.zeros(3), "has shape"),
     "integers": (lambda self, i, **s: np.zeros(len(i), dtype=int), "no float64 array"),
