@@ -45,8 +45,8 @@ def check_declaration(effect: Effect) -> None:
     for attribute in ("code", "title", "stage", "amplitude"):
         assert hasattr(effect, attribute), f"{name} does not state '{attribute}'"
     assert effect.title.strip() and effect.code.strip(), f"{name}: title or letter code is empty"
-    for quantity in (effect.amplitude, *effect.shape):
-        assert isinstance(quantity, Quantity), f"{name}: {quantity!r} is no Quantity"
+    for stated in (effect.amplitude, *effect.shape):
+        assert isinstance(stated, Quantity), f"{name}: {stated!r} is no Quantity"
     assert effect.stage in STAGES, f"{name}: stage '{effect.stage}' is none of {', '.join(STAGES)}"
     text = type(effect).__doc__ or ""
     assert "=" in text and "::" in text, f"{name}: the docstring states no equation after '::'"
