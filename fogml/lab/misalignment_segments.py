@@ -132,13 +132,13 @@ def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
         raise InputError(
             f"{rows.source}, column 'rate': the table never turns; turns both ways were expected"
         )
-    kept = ~transition_mask(run)
+    setting = (np.diff(rows.state) != 0.0) | (np.diff(rows.tilt_deg) != 0.0)
+    kept = ~transition_mask(run, others=np.flatnonzero(setting) + 1)
     if not (kept & ~rest).any():
         raise InputError(
             f"{rows.source}, column 'time': every turn is over before table and gyro have settled (what is "
             "about a change of rate is cut); turn for longer, or give averages with a column 'segment'"
         )
-    setting = (np.diff(rows.state) != 0.0) | (np.diff(rows.tilt_deg) != 0.0)
     changes = setting | (rest[1:] != rest[:-1]) | (kept[1:] != kept[:-1])
     changes |= ~rest[1:] & ~rest[:-1] & (np.sign(rows.rate_deg_s[1:]) != np.sign(rows.rate_deg_s[:-1]))
     edges = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(time)]])

@@ -60,7 +60,7 @@ def time_to_rate_s(run: Run, settled_share: float = 0.02, noises: float = 6.0) -
     return max(longest, _gyro_settling_s(run, changes, settled_share, noises))
 
 
-def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
+def transition_mask(run: Run, margin_s: float | None = None, others: IndexArray | None = None) -> BoolArray:
     """True for the samples to be cut about each change of the table's rate, shape (n,).
 
     Parameters
@@ -72,6 +72,9 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
         table's time to rate, within the source's bounds t_z < m < t_z + 5 s; after a change as long as all
         changes together show that gyro or table have not settled, before one as long as they show that these
         have left, the recorded rate being late.
+    others
+        Rows at which something else changes, as a fixture's tilt: what is after one tells nothing of how the
+        change of the rate before it settles.
 
     Raises
     ------
@@ -90,7 +93,7 @@ def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
     changes, time = _changes(run), run.time
     by_default = margin_s is None
     if margin_s is None:
-        settled_s, left_s = _unsettled_s(run, changes, time_to_rate_s(run) + MARGIN_BEYOND_S)
+        settled_s, left_s = _unsettled_s(run, changes, time_to_rate_s(run) + MARGIN_BEYOND_S, others)
     else:
         settled_s = left_s = margin_s
     starts = changes.start
@@ -216,7 +219,9 @@ def _gyro_settling_s(run: Run, changes: _Changes, settled_share: float, noises: 
     return longest
 
 
-def _unsettled_s(run: Run, changes: _Changes, least_s: float) -> tuple[float, float]:
+def _unsettled_s(
+    run: Run, changes: _Changes, least_s: float, others: IndexArray | None = None
+) -> tuple[float, float]:
     """Time after changes in which all of them together show that gyro or table have not settled, and time
     before them in which they show that these have left, as where the recorded rate comes late [s].
 
@@ -224,11 +229,13 @@ def _unsettled_s(run: Run, changes: _Changes, least_s: float) -> tuple[float, fl
     """
     if len(changes.start) == 0:
         return least_s, least_s
-    edges = np.concatenate([[0], changes.start, [len(run)]])
+    ends = changes.start if others is None else np.union1d(changes.start, others)
+    edges = np.concatenate([[0], ends, [len(run)]])
     first = max(1, round(least_s / run.sample_s))
     reach = max(round(LONGEST_TRANSITION_S / run.sample_s), LEAST_ROWS)
     levels = _middles(run.gyro, edges, reach)
-    rows = unsettled_rows(run.gyro, edges, levels[1:, 0] - levels[:-1, 1], (first, first), (reach, reach))
+    heights = np.where(np.isin(ends, changes.start), levels[1:, 0] - levels[:-1, 1], 0.0)
+    rows = unsettled_rows(run.gyro, edges, heights, (first, first), (reach, reach))
     lasting = np.minimum(np.diff(edges), reach)
     longest = 0.5 * float(min(lasting[lasting >= 4 * first], default=0)) * run.sample_s
     settled_s, left_s = (

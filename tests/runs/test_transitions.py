@@ -129,6 +129,17 @@ def test_nothing_is_left_that_another_clock_puts_at_another_rate(late_s, sample_
     assert mask.mean() < 0.75
 
 
+def test_a_fixture_that_is_tilted_in_a_rest_is_no_settling():
+    """Rest, turn, rest, of 40 s each; in between the fixture is tilted, and Earth rate is another."""
+    rng = np.random.default_rng(2)
+    programme, block = np.repeat([0.0, 10.0, 0.0], 40), np.repeat(np.arange(20), 120)
+    rate = np.tile(programme, 20) * (1.0 - 2.0 * (block % 2))
+    gyro = 3600.0 * rate - 10.0 * (block % 2) + 0.5 * rng.standard_normal(len(rate))
+    run = Run.from_columns(time=np.arange(len(rate)), gyro=gyro, rate=rate)
+    tilted = np.flatnonzero(np.diff(block)) + 1
+    assert transition_mask(run, others=tilted).mean() < 0.1 < 0.3 < transition_mask(run).mean()
+
+
 def test_slow_samples_on_both_sides_of_a_change_are_cut():
     run = runs(10.0)["command"]
     rows = find_transitions(run)
