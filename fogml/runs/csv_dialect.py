@@ -14,7 +14,8 @@ from fogml.runs.csv_header import fields_of, header_over_lines
 from fogml.runs.csv_source import CsvSource, Marks, csv_source, marks_of, number
 from fogml.runs.header_spelling import DATE_NAMES
 from fogml.runs.raw_table import empty_file, wanted_cells
-from fogml.runs.stamps import FRACTION, StampForm, Stamps, stamps_of
+from fogml.runs.stamp_forms import FRACTION, StampForm
+from fogml.runs.stamps import Stamps, stamps_of
 
 _HEAD_BYTES = 1 << 16
 _LINE_END = re.compile(r"\r\n|\r|\n")

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from fogml.errors import InputError, quoted
 from fogml.runs.columns import parse_header
 from fogml.runs.header_spelling import DATE_NAMES, canonical_cells, uncommented, with_units_below
-from fogml.runs.stamps import stamp_form
+from fogml.runs.stamp_forms import stamp_form
 
 _BEGINS = "LabVIEW Measurement"
 _END_OF_BLOCK = "***End_of_Header***"

@@ -18,7 +18,7 @@ from fogml.arrow_arrays import takes_threads, values_of
 from fogml.errors import InputError, counted, quoted
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.raw_table import empty_file
-from fogml.runs.stamps import stamp_form
+from fogml.runs.stamp_forms import stamp_form
 
 PART_BYTES = 1 << 23
 """Bytes of a text that are looked into at once; a part takes some ten times as much memory."""
@@ -68,8 +68,10 @@ def _decoded(path: Path, decoder: codecs.IncrementalDecoder, raw: bytes, read: i
 
 
 _LINE_STAMP = r"(?m)^[\[(<]?((?:[\d/.\-]+[ T])?\d{1,2}:\d\d:\d\d(?:[.:]\d+)?)"
-_AFTER_STAMP = re.compile(_LINE_STAMP + r"(\] ?|(?: \[?[RT]X\]?)?(?: ?->?|:) | \[[RT]X\] | (?=[^ ]*[,;]))")
-"""No sign is part of it: a blank or a bracket ends it."""
+_AFTER_STAMP = re.compile(
+    _LINE_STAMP + r"(\] ?|(?: \[?[RT]X\]?)?(?: ?->?|:) | \[[RT]X\] | (?![A-Z]{2,4}[,;])(?=[^ ]*[,;]))"
+)
+"""No sign is part of it: a blank or a bracket ends it, and no zone's name is a device's text."""
 
 
 def stamp_apart(text: str, mark: str, separator: str | None) -> str:

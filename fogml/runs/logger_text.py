@@ -311,7 +311,7 @@ class _Reader:
         columns = [texts[place].tolist() for place in places]
         columns = [stamps_of_parts(columns)] if len(columns) == PARTS else columns
         if self.clock is None:
-            stamps = stamps_of(list(enumerate(columns)), self.profile.reject.not_numbers)
+            stamps = stamps_of(list(enumerate(columns)), self.profile.reject.not_numbers, digits=True)
             if stamps is None:
                 first = " ".join(str(texts[place][0]) for place in places if len(texts[place]))
                 named = listed([quoted(str(p)) for p in places])

@@ -57,7 +57,8 @@ def clock_fault(time: FloatArray) -> str | None:
     if digits_of_clock(time):
         return (
             f"times such as {np.floor(time[-1]):06.0f} are hours, minutes and seconds in digits, as they jump"
-            " where a minute ends; write them with colons, as in 09:59:59, or in seconds"
+            " where a minute ends; an import profile reads them by 'unit: stamp'; else write them with colons"
+            ", as in 09:59:59, or in seconds"
         )
     return None
 

@@ -16,10 +16,12 @@ from fogml.runs.container_files import groups_of
 from fogml.runs.draft_layout import MOST_ROWS, Field, as_yaml, text_layout
 from fogml.runs.header_spelling import face_of
 from fogml.runs.opening import opened
+from fogml.runs.possible import digits_of_clock
 from fogml.runs.raw_table import vector_fault
 from fogml.runs.reader_process import stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS
-from fogml.runs.stamps import PARTS, stamp_form, stamps_of_parts
+from fogml.runs.stamp_forms import stamp_form
+from fogml.runs.stamps import PARTS, stamps_of_parts
 
 _TIME = re.compile(r"time|stamp|clock|zeit|epoch|tick|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
 _COUNT = re.compile(r"sample|index|count|packet|seq|row|scan|record|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
@@ -217,6 +219,8 @@ def _clock(left: list[Field]) -> list[str]:
         return []
     one = growing[0]
     left.remove(one)
+    if one.first and _is_in_digits(one):
+        return [f"  time: {{source: {as_yaml(one.source)}, unit: stamp}}    {_MARK}HHMMSS, or plain numbers?"]
     if one.unit is not None and is_accepted("time", one.unit):
         line = _entry(f"  time: {{source: {as_yaml(one.source)}, unit: {as_yaml(one.unit)}}}", one)
         rest = [as_yaml(f.source) for f in growing[1:] if f.name != one.name]
@@ -237,6 +241,15 @@ def _clock(left: list[Field]) -> list[str]:
         step = f"steps of {apart:.6g}{f': {lasts}{ms}' if ms or unit != 's' else ''}; "
     line = f"  time: {{source: {as_yaml(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"
     return [_entry(line, one)]
+
+
+def _is_in_digits(one: Field) -> bool:
+    """Whether a field holds times such as 095959: no number has a zero before it, and minutes end."""
+    texts = [text.strip(' "') for text in one.first]
+    is_padded = any(re.match(r"0\d{5}(\D|\Z)", text) for text in texts)
+    form = stamp_form(texts, digits=True)
+    is_time = form is not None and form.kind == "time in digits" and all(map(form.matches, texts))
+    return is_time and (is_padded or (_grows(one) and digits_of_clock(one.numbers)))
 
 
 def _parts_of_a_clock(fields: Sequence[Field]) -> Sequence[Field]:

@@ -69,9 +69,9 @@ def test_greenwich_is_a_zone_and_a_date_that_is_not_read_is_told_as_one(tmp_path
     text = "\n".join(["time,gyro [deg/h]", *lines]) + "\n"
     (tmp_path / "run.csv").write_text(text.replace("ZONE", "GMT"))
     assert read_run(tmp_path / "run.csv").facts.started.isoformat() == "2026-03-23T08:00:00+00:00"
-    (tmp_path / "run.csv").write_text(text.replace("ZONE", "CET"))
+    (tmp_path / "run.csv").write_text(text.replace("ZONE", "CST"))
     with pytest.raises(
-        InputError, match="'2026-03-23 08:00:00 CET' is no date or time of day that is read, such as"
+        InputError, match="'2026-03-23 08:00:00 CST' is no date or time of day that is read, such as"
     ):
         read_run(tmp_path / "run.csv")
 
