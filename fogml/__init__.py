@@ -9,6 +9,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fogml import benchmark as benchmark
+    from fogml import blind as blind
+    from fogml import export as export
+    from fogml import features as features
+    from fogml import fleet as fleet
+    from fogml import gap as gap
+    from fogml import lab as lab
+    from fogml import models as models
+    from fogml import monitor as monitor
+    from fogml import readers as readers
+    from fogml import report as report
+    from fogml import runs as runs
+    from fogml import signals as signals
+    from fogml import testing as testing
+    from fogml import tuning as tuning
+    from fogml import twin as twin
+    from fogml import validation as validation
     from fogml.errors import FogmlError as FogmlError
     from fogml.errors import InputError as InputError
     from fogml.features.parse import parse_features as parse_features
@@ -42,19 +59,21 @@ _HOMES = {
 }
 
 _PACKAGES = (
-    "blind", "export", "features", "fleet", "gap", "lab", "models", "readers", "report", "runs", "signals",
-    "testing", "tuning", "twin", "validation",
+    "benchmark", "blind", "export", "features", "fleet", "gap", "lab", "models", "monitor", "readers",
+    "report", "runs", "signals", "testing", "tuning", "twin", "validation",
 )  # fmt: skip
 
 __all__ = ["__version__", *_HOMES]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
-    if name in _PACKAGES:
-        return import_module(f"fogml.{name}")
-    raise AttributeError(f"module 'fogml' has no attribute {name!r}")
+if not TYPE_CHECKING:  # so that a checker finds names that are none
+
+    def __getattr__(name: str) -> Any:
+        if name in _HOMES:
+            return getattr(import_module(_HOMES[name]), name)
+        if name in _PACKAGES:
+            return import_module(f"fogml.{name}")
+        raise AttributeError(f"module 'fogml' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from fogml.outputs import scratch_folder
+from fogml.processes import needs_posix
 
 _CHILD = Path(__file__).with_name("limited_child.py")
 
@@ -59,7 +60,10 @@ def run_limited(words: Sequence[str], limits: ProgramLimits, data: bytes = b"") 
     ------
     LimitExceededError
         If it took more; whatever it had started is ended.
+    InputError
+        If the system has no such limits.
     """
+    needs_posix(f"{Path(words[0]).name}, which runs within limits,")
     memory = -1 if limits.memory_bytes is None else limits.memory_bytes
     stated = (limits.cpu_s, memory, limits.output_bytes)
     launcher = [sys.executable, "-I", "-S", str(_CHILD), *map(str, stated), *words]

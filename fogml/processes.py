@@ -16,6 +16,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Literal, NoReturn, TypeVar
 
+from fogml.errors import InputError
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -195,6 +197,18 @@ def process_start(pid: int) -> str:
     state, *rest = fields.split()
     # A process that has ended but was not waited for runs no trial.
     return "ended" if state == "Z" else rest[18]
+
+
+def needs_posix(what: str) -> None:
+    """Hold that the system has processes in groups, with limits.
+
+    Raises
+    ------
+    InputError
+        If it has none, as Windows.
+    """
+    if not (hasattr(os, "fork") and hasattr(os, "killpg")):
+        raise InputError(f"{what} needs Linux; on Windows it works in WSL 2: fogml docs install")
 
 
 def available_cores() -> int:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
 
 import pytest
 
+from fogml.cli.app_job import serve
+from fogml.cli.run_commands import AppSettings
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError
+from fogml.export.c_program import host_compiler
 from fogml.limited import LimitExceededError, ProgramLimits, run_limited
 
 PYTHON = [sys.executable, "-I", "-S", "-c"]
@@ -68,4 +74,17 @@ def test_what_a_program_leaves_among_temporary_files_goes_with_it(tmp_path, monk
     code = "import os, time; open(os.environ['TMPDIR'] + '/left.s', 'w'); time.sleep(60)"
     with pytest.raises(LimitExceededError):
         run_limited([*PYTHON, code], ProgramLimits(wall_s=0.5))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("lacking", ["fork", "killpg"])
+def test_a_system_without_groups_of_processes_is_told_before_anything_runs(monkeypatch, tmp_path, lacking):
+    monkeypatch.delattr(os, lacking)
+    for action in (
+        lambda: run_limited(["cc", "--version"], ProgramLimits()),
+        host_compiler,
+        lambda: serve(AppSettings(folder=str(tmp_path / "app")), Terminal()),
+    ):
+        with pytest.raises(InputError, match=r"needs Linux; on Windows it works in WSL 2"):
+            action()
     assert not list(tmp_path.iterdir())

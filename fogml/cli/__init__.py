@@ -1,1 +1,1 @@
-
+"""The command line: one declaration per command."""

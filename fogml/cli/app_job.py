@@ -15,6 +15,7 @@ from fogml.cli.settings import SHIPPED, Settings, given_settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, install_words, quoted
 from fogml.locks import Held, sole_writer
+from fogml.processes import needs_posix
 
 INPUTS: Mapping[str, Mapping[str, str]] = {
     "import": {"file": "run", "profile": "profile"},
@@ -197,6 +198,7 @@ def _setting(key: str, given: Given, field: Mapping[str, Any], value: Any) -> li
 
 def serve(settings: AppSettings, terminal: Terminal) -> None:
     """Serve the page until it is interrupted, or idle for as long as asked."""
+    needs_posix("fogml app")
     try:
         from fogml.app.server import listen
         from fogml.app.server import serve as serve_app

@@ -17,6 +17,7 @@ from fogml.errors import InputError
 from fogml.escaping import terminal_text
 from fogml.export.c_source import COUNTED, DRIVER, SOURCE, CSource
 from fogml.limited import Finished, LimitExceededError, ProgramLimits, run_limited
+from fogml.processes import needs_posix
 
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = (
@@ -40,6 +41,7 @@ RUNNING = ProgramLimits(cpu_s=120, wall_s=300.0, memory_bytes=1 << 30, output_by
 
 def host_compiler() -> str:
     """The C compiler of this machine: ``$CC``, or the first found of cc, gcc and clang."""
+    needs_posix("export of C, which is compiled and compared with the model within limits,")
     for name in (os.environ.get("CC", ""), *COMPILERS):
         if name and shutil.which(name):
             return name

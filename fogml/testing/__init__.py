@@ -6,7 +6,12 @@ The names load on first use.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fogml.testing.effects import check_effect as check_effect
+    from fogml.testing.features import check_feature as check_feature
+    from fogml.testing.models import check_model as check_model
 
 _HOMES = {
     "check_effect": "fogml.testing.effects",

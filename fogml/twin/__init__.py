@@ -1,0 +1,1 @@
+"""The simulator: programmes, a thermal plant, a gyro, and the catalogue of effects."""

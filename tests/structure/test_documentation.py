@@ -6,6 +6,7 @@ import doctest
 import re
 import shlex
 import tomllib
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -162,3 +163,9 @@ def test_the_version_is_the_same_everywhere() -> None:
     )
     assert {settings["project"]["version"], changes[0]} == {fogml.__version__}
     assert re.search(rf"^version: {re.escape(fogml.__version__)}$", citation, re.MULTILINE)
+
+
+def test_every_package_says_what_it_is() -> None:
+    for path in sorted((ROOT / "fogml").glob("*/__init__.py")):
+        package = import_module(f"fogml.{path.parent.name}")
+        assert (package.__doc__ or "").strip(), f"{package.__name__} has no docstring"
