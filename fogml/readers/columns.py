@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.readers.beside import interval_of
+
 BLOCK_BYTES = 1 << 18
 """Held of each table before it is written; files of vehicles hold a hundred tables."""
 
@@ -143,6 +145,8 @@ class Container:
         self.described: list[dict[str, Any]] = []
         self.origin_s: float | None = None
         """Seconds from 1970 to the time 0 of its columns, where the format has a date."""
+        self.beside: dict[str, Any] = {}
+        """Numbers beside the columns, by their names."""
         self.left_out: dict[str, tuple[int, int]] = {}
         """Groups of which columns are left out: how many there are, and how many of the first are given."""
         self._spool: Spool | None = None
@@ -150,7 +154,9 @@ class Container:
     @property
     def told(self) -> dict[str, Any]:
         """What the parent hears."""
-        return {"arrays": self.described, "origin_s": self.origin_s, "left_out": self.left_out}
+        interval = interval_of(self.beside)
+        more = {"origin_s": self.origin_s, "left_out": self.left_out, "interval": interval}
+        return {"arrays": self.described, **more}
 
     def add(self, group: str, name: str, unit: str | None, array: Any) -> None:
         """One more column."""

@@ -9,17 +9,16 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fogml.readers.beside import MOST_TEXT, interval_of, text_of
 from fogml.readers.stored import (
     DEEPEST,
     MOST_NAMES,
-    MOST_TEXT,
     Hdf5File,
     Refused,
     columns_of,
     described,
     is_dataset,
     plain_struct,
-    text_of,
 )
 
 _LONG_BYTES = 1 << 20  # of an array that is put away; a file of shorter ones takes little memory
@@ -53,7 +52,14 @@ class Mat:
             "arrays": told,
             "units": {str(k): text_of(v) for k, v in units.items()} if isinstance(units, dict) else None,
             "facts": plain_struct(facts),
+            "interval": interval_of({**self.numbers(variables), **self.numbers(held)}),
         }
+
+    @staticmethod
+    def numbers(held: Mapping[str, Any]) -> dict[str, Any]:
+        """The single numbers of a struct."""
+        found = {name: np.asarray(value) for name, value in held.items() if getattr(value, "size", 1) == 1}
+        return {name: value for name, value in found.items() if value.dtype.kind in "fiu"}
 
     def groups(self, held: Mapping[str, Any], above: str = "") -> Iterator[list[tuple[str, str, Any, Any]]]:
         """Group, name, unit and array of each column, of the structs within a struct too."""

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from fogml.readers.beside import interval_of, plain, tells_interval, text_of, unused
 from fogml.readers.columns import LONGEST_ARRAY, MOST_COLUMNS
 
 _PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
 MOST_NAMES = 10_000
-MOST_TEXT = 1 << 20
 DEEPEST = 4  # of groups within groups, as HDF5 makes them of a unit with slashes, too
 
 
@@ -77,8 +77,12 @@ class Hdf5(Hdf5File):
         is_group = isinstance(link, self.h5py.HardLink) and isinstance(self.file["run"], self.h5py.Group)
         top = self.file["run"] if is_group else self.only_group(self.file)
         self.arrays: list[Any] = []
-        told = []
+        told, changing = [], []
+        beside = {key: top.attrs[key] for key in top.attrs if tells_interval(key)}
         for group, name, item, fault in self.within(top):
+            if not fault and item.size == 1 and item.dtype.kind in "fiu":
+                beside[name] = np.asarray(item)
+            changing += [] if fault else unused(name, item.attrs)
             columns = [(group, name, item)] if fault else fields_of(group, name, item)
             unit = None if fault else unit_of(item.attrs)
             for place, column, array in columns:
@@ -87,7 +91,7 @@ class Hdf5(Hdf5File):
                 self.arrays.append(array if fault else scaled(array, item.attrs))
                 told.append(described(column, array, unit, fault) | {"group": place[:200]})
         stated = {key: plain(top.attrs[key]) for key in keys if key in top.attrs}
-        self.told = {"arrays": told, "facts": stated}
+        self.told = {"arrays": told, "facts": stated, "unused": changing, "interval": interval_of(beside)}
 
     def within(self, group: Any, above: str = "") -> Iterator[tuple[str, str, Any, str | None]]:
         """Group, name and fault of each dataset of a group and of those within it."""
@@ -169,28 +173,35 @@ def fields_of(group: str, name: str, array: Any) -> list[tuple[str, str, Any]]:
 
 
 class Scaled:
-    """Numbers that are held packed: a factor times what lies in the file, and an offset."""
+    """Numbers that are held packed: a factor times what lies in the file, and an offset; NaN for `none`."""
 
-    def __init__(self, array: Any, factor: float, offset: float) -> None:
-        self.array, self.factor, self.offset = array, factor, offset
+    def __init__(self, array: Any, factor: float, offset: float, none: list[float]) -> None:
+        self.array, self.factor, self.offset, self.none = array, factor, offset, none
         self.ndim, self.shape = array.ndim, array.shape
 
     def __getitem__(self, part: Any) -> Any:
-        return np.asarray(self.array[part], dtype=np.float64) * self.factor + self.offset
+        held = np.asarray(self.array[part])
+        found = held.astype(np.float64) * self.factor + self.offset
+        # What the type can't hold stands nowhere.
+        found[np.isin(held, [v for v in self.none if np.array(v).astype(held.dtype) == v])] = np.nan
+        return found
 
 
 def scaled(array: Any, attributes: Any) -> Any:
-    """An array, unpacked as the conventions of netCDF (CF, 8.1) say where it has these attributes."""
+    """An array, unpacked as the conventions of netCDF (CF, 2.5.1 and 8.1) say where it has attributes."""
     stated = [plain(attributes.get(key, none)) for key, none in (("scale_factor", 1.0), ("add_offset", 0.0))]
-    if stated == [1.0, 0.0] or not all(isinstance(value, int | float) for value in stated):
+    none = [plain(attributes[key]) for key in ("_FillValue", "missing_value") if key in attributes]
+    none = [value for value in none if isinstance(value, int | float)]
+    if (stated == [1.0, 0.0] and not none) or not all(isinstance(value, int | float) for value in stated):
         return array
-    return Scaled(array, *stated)
+    return Scaled(array, stated[0], stated[1], none)
 
 
 def unit_of(attributes: Any) -> str | None:
-    """The unit that stands beside a dataset."""
+    """The unit that stands beside a dataset; of ``seconds since 2026-03-02`` that before the date."""
     found = {key.lower(): key for key in attributes if key.lower() in ("unit", "units")}
-    return text_of(attributes[found.get("unit") or found["units"]]) if found else None
+    stated = text_of(attributes[found.get("unit") or found["units"]]) if found else None
+    return stated and stated.partition(" since ")[0]
 
 
 def is_dataset(value: Any) -> bool:
@@ -206,22 +217,6 @@ def samples(array: Any, start: int, stop: int) -> Iterator[np.ndarray[Any, Any]]
     along = max(range(array.ndim), key=lambda axis: array.shape[axis])
     part = tuple(slice(start, stop) if axis == along else 0 for axis in range(array.ndim))
     yield np.ascontiguousarray(array[part], dtype=np.float64)
-
-
-def text_of(value: Any) -> str:
-    """A text of an attribute or a variable."""
-    text = value.decode("utf-8", errors="replace") if isinstance(value, bytes) else str(value)
-    return text[:MOST_TEXT]
-
-
-def plain(value: Any) -> Any:
-    """A value of one element as Python's own type, None for an array."""
-    if isinstance(value, str | bytes):
-        return text_of(value)
-    if getattr(value, "size", 1) != 1:
-        return None
-    value = value.item() if hasattr(value, "item") else value
-    return value if isinstance(value, bool | int | float) else text_of(value)
 
 
 def plain_struct(value: Any) -> Any:

@@ -20,6 +20,7 @@ class Npz(Container):
     def __init__(self, path: str, keys: list[str]) -> None:
         super().__init__()
         self.first: np.datetime64 | None = None
+        self.beside: dict[str, Any] = {}
         with zipfile.ZipFile(path) as archive:
             for member in archive.namelist():
                 with archive.open(member) as file:
@@ -61,6 +62,8 @@ class Npz(Container):
                 for column in names:
                     self.add_rows(name, column, None, rows, column)
 
+        elif kind.kind in "fiu" and np.prod(shape) == 1:
+            self.beside[name] = np.frombuffer(file.read(kind.itemsize), kind)
         elif (kind.hasobject or kind.kind in "SU") and np.prod(shape) > 1:
             what = "objects, which may run what they hold" if kind.hasobject else "texts"
             self.refuse(name, f"holds {what}; save it as float64 or datetime64")
@@ -104,6 +107,9 @@ class Tdms(Container):
         # Stamps of before 1970 are none that a clock gave.
         self.origin_s = min([start for start in starts if start > 0.0] or starts, default=None)
         self.clocks: dict[str, tuple[float, float]] = {}
+        self.beside = dict(self.file.properties)
+        for group in self.file.groups():
+            self.beside |= group.properties
         for group, channel in channels:
             self.channel(group, channel)
 

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError, install_words, listed, quoted
 from fogml.readers.matlab import RESERVED, USER_BLOCK
 from fogml.runs.columns import column_spec, parse_header, stated_cell
-from fogml.runs.container_files import Group, grouped, unknown_fields
+from fogml.runs.container_files import Group, grouped, unknown_fields, unused_attributes
 from fogml.runs.facts import Facts, facts_from
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
@@ -83,6 +83,7 @@ def hdf5_blocks(
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'")
         vectors, findings = _chosen(path, "hdf5", stored, {})
+        findings = (*findings, *unused_attributes(stored))
         facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the attributes")
         yield from stored_blocks(stored, vectors, findings, facts, rows, columns)
 

@@ -212,6 +212,13 @@ def _fields_left_out(stored: StoredFile) -> Iterator[Finding]:
         yield Finding("fields_left_out", message, count=held - given)
 
 
+def unused_attributes(stored: StoredFile) -> Iterator[Finding]:
+    """What is said of numbers beside columns that may change them, by no convention that is known."""
+    if unused := stored.told.get("unused"):
+        told = f"attributes that change nothing: {listed(unused)}; where they do, a profile states a scale"
+        yield Finding("unused_attributes", told, count=len(unused))
+
+
 def _with_joined(table: RawTable, stored: StoredFile, joined: Sequence[Beside]) -> RawTable:
     """A block with the columns of other groups at its times."""
     if not joined or not len(table):
@@ -251,7 +258,7 @@ def container_columns(
         main = home[found[clock].index] if clock is not None else max(names, key=names.count)
         count = max(next(array for array in found.values() if home[array.index] == main).shape)
         columns: dict[str | int, FloatArray] = {}
-        findings = []
+        findings = [*unused_attributes(stored)]
         for source, array in found.items():
             stored.limits.check_size(path, float(max(array.shape)))
             values = _read_long(stored, array)

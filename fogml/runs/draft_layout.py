@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.readers.beside import interval_in
 from fogml.runs.columns import parse_header
 from fogml.runs.csv_dialect import decoded_head
 from fogml.runs.csv_header import Header, fields_of, is_number_like, labview_header, with_cells_above
@@ -45,8 +46,8 @@ class Field:
         return np.array([np.nan if value is None else value for value in found])
 
 
-def text_layout(path: Path) -> tuple[list[str], list[Field]]:
-    """The layout's keys and the fields of a text file."""
+def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] | None]:
+    """The layout's keys, the fields of a text file, and what is said above them of the interval [s]."""
     head, encoding = decoded_head(path)
     stamp = mark_of_line_stamps(head.splitlines()[-MOST_ROWS:])
     name, lines, data, is_broken = _table_of(head, stamp)
@@ -89,7 +90,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field]]:
         layout.append(f"reject: {{{', '.join(keys)}}}    # {' and '.join(what)}: left out")
     for place, one in enumerate(fields):
         one.first, one.marks = [row[place] for row in rows], marks
-    return layout, fields
+    return layout, fields, interval_in(lines[:data])
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from fogml.errors import InputError, quoted
 from fogml.escaping import visible
 from fogml.numerals import duration
+from fogml.readers.beside import tells_interval
 from fogml.runs.columns import column_spec, conversion, is_accepted, parse_header
 from fogml.runs.container_files import groups_of
 from fogml.runs.draft_layout import MOST_ROWS, Field, as_yaml, text_layout
@@ -53,19 +54,20 @@ _MARK = "# GUESS: "
 def draft_profile(path: Path) -> str:
     """The text of an import profile (YAML) for a file: what is sure, and what is a guess and why."""
     file = opened(path)
-    layout, fields = text_layout(file.path) if file.kind == "csv" else _of_container(path, file.kind)
+    is_text = file.kind == "csv"
+    layout, fields, interval = text_layout(file.path) if is_text else _of_container(path, file.kind)
     if file.within is not None:
         for one in fields:
             # Without its values another column would be taken for what it is.
             file.within.check_column(one.name, sum(bool(text.strip()) for text in one.first), len(one.first))
     lines = ["schema: fogml.import/1", f"description: {as_yaml('draft for ' + path.name)}"]
-    lines += [*layout, *_columns(fields)]
+    lines += [*layout, *_columns(fields, interval)]
     # Names may hold marks that end a line of YAML.
     return "\n".join(map(visible, lines)) + "\n"
 
 
-def _of_container(path: Path, kind: str) -> tuple[list[str], list[Field]]:
-    """The fields of the group that looks most like a gyro's, and of the others' temperatures."""
+def _of_container(path: Path, kind: str) -> tuple[list[str], list[Field], tuple[str, float] | None]:
+    """The fields of the group most like a gyro's and of others' temperatures, and what tells the interval."""
     with stored_file(path, kind, (), DEFAULT_LIMITS) as stored:
         groups = groups_of(stored, kind)
         scores = {g.name: sum(bool(_GYRO.search(n)) for n in g.names) + 2 * g.is_run for g in groups}
@@ -77,18 +79,21 @@ def _of_container(path: Path, kind: str) -> tuple[list[str], list[Field]]:
         for group in groups:
             for cell, array in group.columns:
                 name, unit = parse_header(cell)
+                if tells_interval(array.name) and array.fault is None and np.prod(array.shape) == 1:
+                    continue
                 is_joined = {main, group.name} <= set(timed) and name != "time" and not group.is_run
                 if group.name == main or (is_joined and _WARM.search(name)):
                     source = f"{array.group}/{array.name}" if array.group else array.name
                     sound = vector_fault(array) is None
                     held = stored.read(array, 0, min(max(array.shape), MOST_ROWS)) if sound else ()
                     fields.append(Field(source, name, unit, [repr(float(value)) for value in held]))
+        interval = stored.told.get("interval")
     others = [name for name in scores if name != main]
-    return ([f"# Other groups of the file: {', '.join(others[:20])}"] if others else []), fields
+    return ([f"# Other groups of the file: {', '.join(others[:20])}"] if others else []), fields, interval
 
 
-def _columns(fields: Sequence[Field]) -> list[str]:
-    """The keys that say which field is which."""
+def _columns(fields: Sequence[Field], interval: tuple[str, float] | None) -> list[str]:
+    """The keys that say which field is which, given what the file says of the interval [s]."""
     left = list(fields)
     clock = _clock(left)
     lines = ["columns:", *clock]
@@ -130,7 +135,10 @@ def _columns(fields: Sequence[Field]) -> list[str]:
     if not any(line.startswith("  time:") for line in lines):
         held = [f for f in left if f.first and (f.name == "time" or _TIME.search(f.name))]
         unread = f" ({quoted(held[0].first[0].strip())} is no date that is read)" if held else ""
-        lines.append(f"sample_s: 0.01    {_MARK}no clock was found{unread}; write the true interval [s]")
+        by = "write the true interval [s]" if interval is None else f"by {visible(interval[0])}"
+        lines.append(
+            f"sample_s: {interval[1] if interval else 0.01:.12g}    {_MARK}no clock was found{unread}; {by}"
+        )
     others = [*left, *([] if many else gyros[1:])]
     rest = [f for f in others if isinstance(f.source, str) and (np.isfinite(f.numbers).any() or not f.first)]
     if rest:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import h5py
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from fogml.errors import InputError
 from fogml.runs.profile_draft import draft_profile
@@ -122,3 +123,82 @@ def test_objects_and_texts_of_numpy_archives_are_named(tmp_path, kind, what):
     np.savez(tmp_path / "log.npz", **{"time": TIME.astype(kind), "gyro [deg/h]": GYRO})
     with pytest.raises(InputError, match=f"column 'time': holds {what}; save it as float64 or datetime64"):
         read_run(tmp_path / "log.npz")
+
+
+@pytest.mark.parametrize("key", ["_FillValue", "missing_value"])
+def test_values_that_netcdf_calls_missing_are_none(tmp_path, key):
+    """A packed -32768 was a rate of -327.68 deg/h."""
+    counts = np.arange(COUNT, dtype="i2")
+    counts[7] = -32768
+    with h5py.File(tmp_path / "log.nc.h5", "w") as file:
+        write(file, "time", TIME, "seconds since 2026-03-11 08:00:00")
+        write(file, "gyro", counts, "deg/h", scale_factor=0.01, **{key: np.int16(-32768)})
+        # What the type can't hold is no value of it.
+        write(file, "T", np.zeros(COUNT, "i2"), "degC", add_offset=20.0, **{key: 1e20})
+    with pytest.raises(InputError, match="column 'gyro', row 8: the value is missing"):
+        read_run(tmp_path / "log.nc.h5")
+    run = read_run(tmp_path / "log.nc.h5", repair=True, most_dropped=0.5)
+    np.testing.assert_allclose(run.gyro, np.delete(0.01 * np.arange(COUNT), 7))
+    np.testing.assert_array_equal(run.columns["T"], 20.0)
+
+
+def test_attributes_of_no_convention_that_may_change_numbers_are_told(tmp_path):
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        write(file, "time", TIME, "s", scale=1.0, offset=0.0)
+        write(file, "gyro", GYRO, "deg/h", scale=0.001)
+        write(file, "T", WARM, "degC")
+    (found,) = (f for f in read_run(tmp_path / "log.h5").findings if f.code == "unused_attributes")
+    assert "scale = 0.001 of 'gyro'" in found.message
+    assert found.count == 1
+    (run,) = by_draft(tmp_path / "log.h5")
+    assert "unused_attributes" in {f.code for f in run.findings}
+
+
+def h5_of(path, rate):
+    with h5py.File(path, "w") as file:
+        write(file, "gyro", GYRO, "deg/h")
+        file.attrs["SampleRate"] = rate
+
+
+def h5_with_a_number(path, rate):
+    with h5py.File(path, "w") as file:
+        write(file, "gyro", GYRO, "deg/h")
+        file["dt"] = 1.0 / rate
+
+
+def mat_of(path, rate):
+    savemat(path, {"gyro": GYRO, "Fs": rate, "units": {"gyro": "deg/h"}})
+
+
+def mat_struct(path, rate):
+    savemat(path, {"run": {"gyro": GYRO, "Ts": 1.0 / rate, "units": {"gyro": "deg/h"}}})
+
+
+def npz_of(path, rate):
+    np.savez(path, **{"gyro [deg/h]": GYRO, "sample_rate": rate})
+
+
+def tdms_of(path, rate):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(path) as file:
+        group = nptdms.GroupObject("g", {"SampleRate": rate})
+        file.write_segment([group, nptdms.ChannelObject("g", "gyro", GYRO, {"unit_string": "deg/h"})])
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        ("a.h5", h5_of),
+        ("b.h5", h5_with_a_number),
+        ("a.mat", mat_of),
+        ("b.mat", mat_struct),
+        ("a.npz", npz_of),
+        ("a.tdms", tdms_of),
+    ],
+)
+def test_a_draft_takes_the_interval_from_a_rate_beside_the_columns_as_a_guess(tmp_path, name, written):
+    written(tmp_path / name, 8.0)
+    assert "sample_s: 0.125    # GUESS: no clock was found; by " in draft_profile(tmp_path / name)
+    (run,) = by_draft(tmp_path / name)
+    np.testing.assert_allclose(run.time, 0.125 * np.arange(len(GYRO)))
+    np.testing.assert_allclose(run.gyro, GYRO)

@@ -504,3 +504,28 @@ def test_two_clocks_are_a_guess(tmp_path):
     rows = "".join(f"2026-03-11 08:00:{i:02d}.1,{i},{i * i % 37}.5\n" for i in range(COUNT))
     (tmp_path / "a.csv").write_text(f"PC time,DAQ time [s],gyro [deg/h]\n{rows}")
     assert '# GUESS: or by "DAQ time [s]"?' in draft_profile(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(
+    ("above", "interval"),
+    [
+        ("Sample rate: 50 Hz", "0.02"),
+        ("Sampling Frequency [kHz];0,05 kHz", "0.02"),
+        ("Sample interval = 20 ms", "0.02"),
+        ("Rate range: 50", "0.01"),
+    ],
+)
+def test_an_interval_above_the_data_is_a_guess_where_no_clock_is(tmp_path, above, interval):
+    rows = "".join(f"{i * i % 37}.5;{25 + i % 3}\n" for i in range(COUNT))
+    (tmp_path / "a.csv").write_text(f"{above}\ngyro [deg/h];T [degC]\n{rows}")
+    assert f"sample_s: {interval}    # GUESS" in draft_profile(tmp_path / "a.csv")
+
+
+def test_a_labview_file_without_x_columns_has_its_interval_and_separator_stated(tmp_path):
+    rows = [f",{g},{25 + i / 8}" for i, g in enumerate(GYRO)]
+    path = tmp_path / "a.lvm"
+    path.write_text(labview(x_columns="No", comma=True, rows=rows))
+    (tmp_path / "p.yaml").write_text(draft_profile(path))
+    assert "sample_s: 0.5    # GUESS: no clock was found; by Delta_X" in (tmp_path / "p.yaml").read_text()
+    (run,) = import_recording(path, load_profile(tmp_path / "p.yaml"))
+    np.testing.assert_allclose(run.gyro, GYRO)
