@@ -18,7 +18,7 @@ _SIGNS = str.maketrans(
 )
 # By lower case, without blanks, the degree sign written "deg".
 _SPELLINGS = {
-    "s": ("sec", "secs", "second", "seconds", "秒"),
+    "s": ("sec", "secs", "second", "seconds", "秒", "с", "сек"),
     "ms": ("msec", "msecs", "millisecond", "milliseconds", "毫秒"),
     "us": ("µs", "usec", "µsec", "microsecond", "microseconds", "微秒"),
     "ns": ("nsec", "nanosecond", "nanoseconds"),
@@ -34,7 +34,7 @@ _SPELLINGS = {
     "mrad/s": (),
     "arcsec/s": ('"/s', "arcsec/sec", "as/s"),
     "arcsec/h": ('"/h', "arcsec/hr", "arcsec/hour", "as/h"),
-    "degC": ("c", "celsius", "degcelsius", "centigrade", "摄氏度"),
+    "degC": ("c", "degс", "celsius", "degcelsius", "centigrade", "摄氏度"),
     "degF": ("f", "fahrenheit", "degfahrenheit"),
     "K": ("kelvin", "degk", "degkelvin"),
     "count": ("counts", "lsb", "lsbs", "digit", "digits", "ticks", "adc"),
@@ -48,7 +48,8 @@ _SPELLINGS = {
 }
 _CANONICAL = {word.lower(): unit for unit, words in _SPELLINGS.items() for word in (unit, *words)}
 _HALVES = {"hour": "h", "hr": "h", "hrs": "h", "second": "s", "sec": "s", "degrees": "deg", "degree": "deg",
-           "小时": "h", "时": "h", "分": "min", "秒": "s", "度": "deg", "弧度": "rad"}  # fmt: skip
+           "小时": "h", "时": "h", "分": "min", "秒": "s", "度": "deg", "弧度": "rad",
+           "град": "deg", "ч": "h", "с": "s", "сек": "s"}  # fmt: skip
 _PLAIN_UNIT = re.compile(r"[A-Za-z_]{1,20}(/[A-Za-z_]{1,20})?\Z")
 # What pint calls the units that the run format writes otherwise.
 _OF_PINT = {"g": "standard_gravity", "G": "gauss", "%": "percent", "degC": "degree_Celsius", "h": "hour"}

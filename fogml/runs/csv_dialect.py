@@ -12,6 +12,7 @@ from fogml.errors import InputError, printable
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.csv_header import fields_of, header_over_lines
 from fogml.runs.csv_source import CsvSource, Marks, csv_source, marks_of, number
+from fogml.runs.encodings import encoding_of
 from fogml.runs.header_spelling import DATE_NAMES
 from fogml.runs.raw_table import empty_file, wanted_cells
 from fogml.runs.stamp_forms import FRACTION, StampForm
@@ -121,7 +122,7 @@ def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
     with source.open() as opened:
         head = opened.read(_HEAD_BYTES)
     cut = len(head) == _HEAD_BYTES
-    encoding = _encoding(head, cut)
+    encoding = encoding_of(head, cut)
     lines = _LINE_END.split(head.decode(encoding, errors="ignore"))
     if cut and len(lines) > 1:
         lines.pop()  # incomplete
@@ -176,7 +177,7 @@ def decoded_head(path: Path) -> tuple[str, str]:
         head = opened.read(_HEAD_BYTES)
     if any(byte < 32 and byte not in b"\t\r\n\f" for byte in head[:1000]):
         raise _no_text(path.name)
-    encoding = _encoding(head, len(head) == _HEAD_BYTES)
+    encoding = encoding_of(head, len(head) == _HEAD_BYTES)
     text = head.decode(encoding, errors="replace")
     # A line that the head cuts is left out.
     return text if len(head) < _HEAD_BYTES else text[: text.rfind("\n") + 1], source.wide or encoding
@@ -195,7 +196,7 @@ def text_of(path: Path) -> str:
         source = csv_source(path, file.read(_HEAD_BYTES))
     with source.open() as opened:
         content = opened.read()
-    return content.decode(_encoding(content, cut=False), errors="replace")
+    return content.decode(encoding_of(content, cut=False), errors="replace")
 
 
 def is_sure(content: bytes) -> bool:
@@ -260,22 +261,6 @@ def _stamps(cells: Sequence[str], rows: Sequence[Sequence[str]], decimal: str) -
         if both and [form.kind for _, form in both.columns] == ["date", "time"]:
             return both
     return stamps_of([(places[0], texts[places[0]])])
-
-
-def _encoding(head: bytes, cut: bool) -> str:
-    for end in range(4 if cut else 1):
-        # The last character of a cut head may be incomplete.
-        try:
-            head[: len(head) - end].decode("utf-8")
-        except UnicodeDecodeError:
-            continue
-        return "utf-8-sig"
-    # Both bytes of a Chinese sign are above 0xA0; the degree sign of Latin-1 stands before a plain letter.
-    try:
-        head[: (head.rfind(b"\n") + 1 if cut else 0) or len(head)].decode("gb2312")
-    except UnicodeDecodeError:
-        return "latin-1"
-    return "gb18030"
 
 
 def _blanks(row: Sequence[str], width: int) -> int:

@@ -65,7 +65,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
         doubt = (
             ""
             if encoding.startswith("utf")
-            else "    # GUESS: are the names right? else cp1251, shift_jis, ..."
+            else "    # GUESS: are the names right? else cp1251, koi8-r, shift_jis, big5 ..."
         )
         layout.append(f"encoding: {encoding}{doubt}")
     header = _Header.above(lines, data, width, mark)

@@ -25,15 +25,16 @@ _DATE_AND_TIME = (("date", "and", "time"), ("datum", "und", "zeit"), ("datum", "
                   ("日期", "和", "时间"))  # fmt: skip
 _SYNONYMS = {
     "time": ("t", "timestamp", "elapsed", "elapsedtime", "zeit", "uhrzeit", "zeitstempel", "时间",
-             "时刻", "采样时间", "indexlevel0",
+             "时刻", "采样时间", "indexlevel0", "時刻", "時間", "время",
              *(d + mark + t for d, word, t in _DATE_AND_TIME for mark in ("", "/", ",", word))),
     "gyro": ("gyroscope", "gyrooutput", "gyrorate", "fog", "fogoutput", "fograte", "omega", "ω",
              "angularrate", "angularvelocity", "rotationrate", "drehrate", "kreisel",
              "kreiselausgang", "陀螺", "陀螺输出", "陀螺仪", "陀螺仪输出", "角速度", "角速率",
-             "陀螺角速度", "陀螺角速率"),
+             "陀螺角速度", "陀螺角速率", "ジャイロ", "ジャイロ出力", "гироскоп"),
     "rate": ("tablerate", "turntablerate", "drehtischrate", "转台速率", "转台转速", "转台角速度",
              "转台角速率"),
-    "T": ("temp", "temperature", "temperatur", "spulentemperatur", "温度", "线圈温度", "光纤环温度",
+    "T": ("temp", "temperature", "temperatur", "spulentemperatur", "температура", "温度", "线圈温度",
+          "光纤环温度",
           *(name for of in _OF_THE_GYRO for name in (f"t{of}", *(of + word for word in _WARM)))),
     **{
         f"T_{of}": (*(of + word for word in _WARM), *words)

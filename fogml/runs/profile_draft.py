@@ -30,9 +30,7 @@ _DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
 _GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
 _WARM = re.compile(r"temp|die|oven|therm|^t(\w{0,3}|[_.]\w*)$|温", re.IGNORECASE)
 _SET_POINT = re.compile(r"\bs[pv]\b|soll|set[ _-]?(point|value|temp)|target|consigne|设定", re.IGNORECASE)
-_OWN = re.compile(
-    r"die|coil|gyr|fog|sensor|imu|spule|kreisel|^t(emp(erature?)?)?$|陀螺|线圈|光纤", re.IGNORECASE
-)
+_OWN = re.compile(r"die|coil|gyr|fog|sensor|imu|spule|kreisel|^t(emp\w*)?$|陀螺|线圈|光纤", re.IGNORECASE)
 """Of a thermometer's name that puts it in the gyro, or nowhere."""
 _NO_OUTPUT = re.compile(r"std|dev|sigma|rms|var|noise|err|min|max|cmd|command|table|turntable", re.IGNORECASE)
 """Of a gyro's name that tells of something about its output, or of another's rate."""

@@ -1,0 +1,52 @@
+"""Encodings are told by what their text can be in no other; names and units are those that were written."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.runs.encodings import encoding_of
+from fogml.runs.profile_draft import draft_profile
+from fogml.runs.profiles import import_recording, load_profile
+from fogml.runs.reading import read_run
+
+COUNT = 40
+
+
+@pytest.mark.parametrize(
+    ("header", "encoding"),
+    [
+        ("時刻 [s],ジャイロ [°/h],温度 [℃]", "cp932"),
+        ("time [s],gyro [deg/h],T [℃]", "cp932"),  # one sign alone
+        ("Время [с],Гироскоп [град/ч],Температура [°С]", "cp1251"),
+        ("ВРЕМЯ [s],Гироскоп [deg/h],T [degC]", "cp1251"),
+        ("时间 [s],陀螺 [°/h],温度 [℃]", "gb18030"),
+        ("时间 [s],速率 [°/h],温度 [℃]", "gb18030"),
+        ("Zeit [s],Größe ÄÖÜ [°/h],Spule außen [°C]", "latin-1"),
+        ("Temps [s],Vitesse mesurée à l’arrêt [°/h],µ", "cp1252"),
+        ("time [s],gyro [°/h],T [°C]", "latin-1"),
+        ("time [s],gyro [°/h],T [℃]", "utf-8-sig"),
+    ],
+)
+def test_encodings_of_headers(header, encoding):
+    content = f"{header}\n1,2,3\n".encode(encoding)
+    found = encoding_of(content, cut=False)
+    assert found == {"cp1252": "latin-1"}.get(encoding, encoding)
+    assert encoding_of(content + header.encode(encoding)[:-3], cut=True) == found
+
+
+@pytest.mark.parametrize(
+    ("header", "encoding"),
+    [
+        ("時刻 [s],ジャイロ [°/h],温度 [℃]", "shift_jis"),
+        ("Время [с],Гироскоп [град/ч],Температура [°C]", "cp1251"),
+    ],
+)
+def test_a_run_and_its_draft_have_the_columns_that_were_written(tmp_path, header, encoding):
+    rows = "".join(f"{i},{9.5 + i * i % 37},{25 + i / 8}\n" for i in range(COUNT))
+    path = tmp_path / "a.csv"
+    path.write_bytes(f"{header}\n{rows}".encode(encoding))
+    (tmp_path / "p.yaml").write_text(draft_profile(path), encoding="utf-8")
+    for run in (read_run(path), *import_recording(path, load_profile(tmp_path / "p.yaml"))):
+        assert set(run.columns) == {"time", "gyro", "T"}
+        np.testing.assert_allclose(run.gyro, 9.5 + np.arange(COUNT) ** 2 % 37)
