@@ -223,6 +223,7 @@ def floor_model(
         frequency_hz=spectrum.frequency_hz[kept],
         power=spectrum.power[kept],
         count=spectrum.count[kept],
+        stretch_s=spectrum.stretch_s[kept],
     )
     slow = slow[kept]
     own = ("Q", "B") if drifts else ("Q", "B", "K")

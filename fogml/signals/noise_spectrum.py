@@ -90,6 +90,8 @@ class Spectrum:
         Mean density of each row [(deg/h)^2/Hz], shape (rows,).
     count
         Coefficients behind each row: degrees of freedom, shape (rows,).
+    stretch_s
+        Length of the stretch that they are of, of several the mean by their coefficients [s], shape (rows,).
     values
         Signed coefficients of the first rows, whose count is 1, shape (single,); their squares are its power.
     columns
@@ -106,6 +108,7 @@ class Spectrum:
     frequency_hz: FloatArray
     power: FloatArray
     count: FloatArray
+    stretch_s: FloatArray
     values: FloatArray
     columns: FloatArray
     removed: FloatArray
@@ -175,7 +178,8 @@ def spectrum_of(
     edges = _edges((single + 0.5) / longest, fine.per_octave)
     sums = np.zeros(len(edges) - 1)
     counts = np.zeros(len(edges) - 1)
-    low_f, low_v, low_x = [], [], []
+    ends = np.zeros(len(edges) - 1)
+    low_f, low_v, low_x, low_s = [], [], [], []
     lines: list[tuple[int, list[SpectralLine]]] = []
     for i, n, (x, means, _) in zip(kept, lengths, coarse):
         y, middle = large.empty(n), means.mean()
@@ -187,6 +191,7 @@ def spectrum_of(
         coefficients *= np.sqrt(2.0 * sample_s)
         alone = min(single, n - 1)
         low_f.append(np.arange(1, alone + 1) / (2.0 * n * sample_s))
+        low_s.append(np.full(alone, n * sample_s))
         low_v.append(coefficients[1 : alone + 1].copy())
         scale = np.sqrt(2.0 * sample_s * n / len(x))
         low_x.append(scale * np.array([cosine_transform(c)[1 : alone + 1] for c in x.T]).reshape(-1, alone).T)
@@ -204,12 +209,13 @@ def spectrum_of(
             square, at, sample_s, n, alone + 1, chance, fewest=fine.line_fewest, near=fine.line_near
         )
         lines.append((n, found))
+        count = np.diff(at)
         if masked is not None:
             square[masked] = 0.0
             lost = np.searchsorted(at, np.flatnonzero(masked), side="right") - 1
-            counts[used] += (np.diff(at) - np.bincount(lost, minlength=len(at) - 1))[used]
-        else:
-            counts[used] += np.diff(at)[used]
+            count = count - np.bincount(lost, minlength=len(at) - 1)
+        counts[used] += count[used]
+        ends[used] += count[used] / (n * sample_s)
         sums[used] += np.add.reduceat(square, first)
         large.release()
     seen = counts > 0
@@ -224,6 +230,7 @@ def spectrum_of(
         np.vstack((np.repeat(below[:, None], POINTS, axis=1), binned[seen])),
         np.concatenate((values**2, sums[seen] / counts[seen])),
         np.concatenate((np.ones(len(values)), counts[seen])),
+        np.concatenate((*low_s, counts[seen] / ends[seen])),
         values,
         np.vstack(low_x),
         removed,

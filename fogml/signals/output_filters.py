@@ -30,11 +30,17 @@ class SpectrumTerms:
     correlation_s: float | None = None
 
 
-def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: SpectrumTerms) -> FloatArray:
+def term_shapes(
+    frequency_hz: FloatArray, sample_s: float, terms: SpectrumTerms, stretch_s: float | FloatArray = np.inf
+) -> FloatArray:
     """Sampled one-sided density of each term of coefficient 1, shape of frequencies and (terms,).
 
     Samples are means over the sample interval, as a gyro's are: what lies above half the sampling rate
     folds back, ``sum_j S(f + j/T) sinc^2`` in closed form (Hurwitz' zeta function). A drift, D, is smooth.
+
+    Of quantisation, differences of white angles, the two angles at the ends of a stretch of length
+    `stretch_s` [s] add ``8 cos^2(pi f T) / stretch_s`` to the squares of its cosine transform, which is white
+    at low frequencies: it would count as angle random walk.
     """
     from scipy.special import zeta
 
@@ -50,7 +56,8 @@ def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: SpectrumTerms)
             folded = zeta(4.0, x) + zeta(4.0, 1.0 - x)
             columns.append(sine * sample_s**2 / (2.0 * np.pi**2) * folded)
         elif name == "Q":
-            columns.append(8.0 / sample_s * np.pi**2 * sine)
+            square = np.pi**2 * sine
+            columns.append(8.0 / sample_s * square + 8.0 / stretch_s * (1.0 - square))
         elif name == "D":
             columns.append((2.0 * np.pi * frequency_hz) ** -4.0)
         elif name == "E":

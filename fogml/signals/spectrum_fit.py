@@ -119,7 +119,7 @@ class SpectrumModel:
         self._cycles = spectrum.frequency_hz * spectrum.sample_s
         # A filter that lets nothing of the whole spectrum pass is told from no other.
         self._lowest_corner = float(np.log(np.pi * np.min(self._cycles, initial=0.5)))
-        shapes = term_shapes(spectrum.frequency_hz, spectrum.sample_s, terms)
+        shapes = term_shapes(spectrum.frequency_hz, spectrum.sample_s, terms, spectrum.stretch_s[:, None])
         self._before = [i for i, name in enumerate(terms.names) if name not in AFTER]
         self._ends = [i for i, name in enumerate(terms.names) if name == "E"]
         self._shapes, self._end_shapes = shapes[..., self._before], shapes[..., self._ends]

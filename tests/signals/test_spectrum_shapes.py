@@ -59,6 +59,33 @@ def test_what_the_ends_of_a_smooth_series_add_is_flat_once_differenced_twice() -
     )
 
 
+@pytest.mark.parametrize("lengths", [(40,), (40, 30)])
+def test_quantisation_is_what_differences_of_white_angles_make_of_a_cosine_transform(
+    lengths: tuple[int, ...],
+) -> None:
+    """The mean of squares over all angles of variance 1, one after the other."""
+    sample_s, expected = 0.5, 0.0
+    for place, n in enumerate(lengths):
+        for rates in np.diff(np.eye(n + 1), axis=0).T / sample_s:
+            stretches = [rates if other == place else np.zeros(m) for other, m in enumerate(lengths)]
+            spectrum = spectrum_of(stretches, sample_s)
+            expected += spectrum.power
+    terms, stretch_s = SpectrumTerms(("Q",)), spectrum.stretch_s[:, None]
+    shape = term_shapes(spectrum.frequency_hz, sample_s, terms, stretch_s).mean(axis=1)[:, 0]
+    assert shape == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_angle_random_walk_below_quantisation_is_not_what_angles_at_the_ends_make(seed: int) -> None:
+    """Quantisation of 5 urad over N of 0.002 deg/sqrt(h), equal at 221 s; 128 tests of 2000 s."""
+    rng, sample_s, rows = np.random.default_rng(seed), 0.5, 4000
+    angles = np.degrees(5e-6) * 3600.0 * rng.standard_normal((128, rows + 1))
+    rates = np.diff(angles) / sample_s + 0.12 / np.sqrt(sample_s) * rng.standard_normal((128, rows))
+    spectrum = spectrum_of(list(rates), sample_s)
+    fit = SpectrumModel(spectrum, SpectrumTerms(("N", "Q"))).fit()
+    assert np.sqrt(fit["N"]) == pytest.approx(0.12, rel=0.02)
+
+
 @pytest.mark.parametrize("seed", [0, 4, 5])
 def test_a_fit_beside_columns_is_where_a_simplex_ends(seed: int) -> None:
     """Where constants of columns take most of the lowest rows, what they leave is little to go by."""
