@@ -19,7 +19,7 @@ from fogml.runs.columns import TIME_ON, column_spec, conversion, parse_header
 from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import column_meant, face_of
-from fogml.runs.other_rate import on_gyro_rows
+from fogml.runs.other_rate import on_gyro_rows, other_clocks
 from fogml.runs.possible import (
     REPAIR,
     Rows,
@@ -282,6 +282,7 @@ def _internal_columns(
             message += "; a temperature is used once it is called T, T_in, T_out, T1 … or T_case"
             message += _of_faces(unknown)
         notes.append(Finding("unknown_column", message, column=unknown[0], count=len(unknown)))
+        notes += other_clocks(columns["time"], {name: columns[name] for name in unknown}, stated)
     return columns, gyro_unit, tick_s, notes
 
 

@@ -57,10 +57,13 @@ def labview_header(lines: Sequence[str]) -> LabviewHeader | None:
     if names[-1] in ("Comment", ""):
         names.pop()
     is_time = keys.get("X_Columns", ["One"])[0] != "No" and keys.get("X_Dimension", ["Time"])[0] == "Time"
-    units, cells = iter(keys.get("Y_Unit_Label", [])), []
+    labels = keys.get("Y_Unit_Label", [])
+    # With a column of X values for each channel, keys stand above the latter.
+    has_pairs = names.count("X_Value") > 1 and not any(label.strip() for label in labels[1::2])
+    units, cells = iter(labels[:: 2 if has_pairs else 1]), []
     for i, name in enumerate(names):
         if name == "X_Value":
-            cells.append("time [s]" if i == 0 and is_time else f"X_Value {i}")
+            cells.append("time [s]" if i == 0 and is_time else f"X_Value {i}" + " [s]" * is_time)
         else:
             unit = next(units, "").strip()
             cells.append(f"{name} [{unit}]" if unit else name)

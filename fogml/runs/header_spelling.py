@@ -138,6 +138,9 @@ def with_units_below(cells: Sequence[str], row: Sequence[str]) -> tuple[str, ...
     if not stated or any(_NUMBER.match(unit) or set("[]") & set(unit) for unit in stated):
         return None
     units += [""] * (len(cells) - len(units))
+    both = [(above, unit) for cell, unit in zip(cells, units) if unit and (above := parse_header(cell)[1])]
+    if any(is_unit(above) and is_unit(unit) and above != canonical_unit(unit) for above, unit in both):
+        return None
     taken = [bool(unit) and parse_header(cell)[1] is None for cell, unit in zip(cells, units)]
     below_it = zip(cells, units, taken, strict=False)
     found = canonical_cells([f"{cell} [{unit}]" if is_new else cell for cell, unit, is_new in below_it])

@@ -7,15 +7,15 @@ Simulink's logged signals are written with ``writetable`` or ``save``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
-from fogml.numerals import duration
-from fogml.runs.columns import DUTY, column_spec, conversion, parse_header
+from fogml.numerals import duration, short
+from fogml.runs.columns import DUTY, column_spec, conversion, is_accepted, parse_header
 from fogml.runs.findings import Finding
 from fogml.runs.reader_process import StoredArray, StoredFile
 from fogml.runs.run import Run
@@ -27,6 +27,7 @@ REGULAR_SHARE = 0.9
 """Share of its values that must be as many rows apart as usual, to half of that or one row."""
 LONGEST_HOLE = 3.0
 """Nothing is filled in where values are more usual distances apart [s] than this."""
+_LEAST_TIMES = 10
 
 
 def is_of_another_rate(values: FloatArray) -> bool:
@@ -104,6 +105,28 @@ def _at(time: FloatArray, known: FloatArray, values: FloatArray, hold: bool) -> 
     apart = known[after] - known[before]
     hole = (apart > LONGEST_HOLE * float(np.median(np.diff(known)))) & (time != known[before])
     return np.where(hole, np.nan, found)
+
+
+def other_clocks(
+    time: FloatArray, columns: Mapping[str, FloatArray], units: Mapping[str, str | None]
+) -> Iterator[Finding]:
+    """What is said of columns, in the units stated, that count up and show other times than the clock [s]."""
+    for name, values in columns.items():
+        unit = units.get(name)
+        sound = np.isfinite(values) & np.isfinite(time)
+        if unit is None or not is_accepted("time", unit) or np.count_nonzero(sound) < _LEAST_TIMES:
+            continue
+        own, its = time[sound], values[sound] * conversion("time", unit, "")[0]
+        apart = (its - its[0]) - (own - own[0])
+        step_s = float(np.median(np.abs(np.diff(own))))
+        if np.all(np.diff(its) > 0.0) and np.max(np.abs(apart)) > 2.0 * step_s:
+            worst = int(np.argmax(np.abs(apart)))
+            shown, true = (short(float(clock[worst] - clock[0]), 6) for clock in (its, own))
+            told = (
+                f"'{name}' counts up as a clock does and shows {shown} s where 'time' shows {true} s; what "
+                "goes by it belongs into a file of its own, or a profile names it as the clock"
+            )
+            yield Finding("other_clock", told, column=name)
 
 
 def held_beyond(

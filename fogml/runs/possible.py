@@ -20,8 +20,8 @@ GREATEST = 1e20
 """Values beyond this, in any unit of the run format, are faults; a count of 64 bits is below it."""
 SHORTEST_STEP_S = 1e-9
 """No gyro is sampled faster than this [s]."""
-GREATEST_TIME_S = 1e13
-"""No clock shows more [s]: an epoch in seconds is 2e9, 300,000 years are 1e13."""
+GREATEST_TIME_S = 1e11
+"""No clock shows more [s]: since 1970 it is 2e9, since year 1, as .NET counts, 6e10; 2e12 are ms."""
 ROUGH_STEP = 0.1
 """Single precision is too rough for a clock where its numbers lie more of a mean interval apart."""
 
@@ -50,7 +50,7 @@ def clock_fault(time: FloatArray) -> str | None:
         return None
     if max(abs(time[0]), abs(time[-1])) > GREATEST_TIME_S:
         most = max(time[0], time[-1], key=abs)
-        return f"times up to {short(most)} s are no clock's; state its unit, e.g. 'time [us]'"
+        return f"times up to {short(most)} s are no clock's; state its unit, e.g. 'time [ms]'"
     step = float(time[-1] - time[0]) / (len(time) - 1)
     if step < SHORTEST_STEP_S:
         return f"samples {short(step)} s apart are no gyro's; state the clock's unit, e.g. 'time [s]'"

@@ -229,7 +229,8 @@ def _clock(left: list[Field]) -> list[str]:
         return [f"  time: {{source: {as_yaml(one.source)}, unit: stamp}}    {_MARK}HHMMSS, or plain numbers?"]
     if one.unit is not None and is_accepted("time", one.unit):
         line = _entry(f"  time: {{source: {as_yaml(one.source)}, unit: {as_yaml(one.unit)}}}", one)
-        rest = [as_yaml(f.source) for f in growing[1:] if f.name != one.name]
+        timed = [f for f in left if _grows(f) and f.unit is not None and is_accepted("time", f.unit)]
+        rest = [as_yaml(f.source) for f in timed if f.name != one.name]
         return [_doubted(line, f"or by {', '.join(rest)}?") if rest else line]
     middle = np.median(one.numbers) if one.first else np.nan
     apart = np.median(np.diff(one.numbers)) if len(one.first) > 1 else np.nan
