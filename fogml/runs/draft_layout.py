@@ -19,7 +19,7 @@ from fogml.runs.csv_dialect import decoded_head
 from fogml.runs.csv_header import Header, fields_of, is_number_like, labview_header, with_cells_above
 from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
 from fogml.runs.header_spelling import canonical_cells, uncommented, with_units_below
-from fogml.runs.logger_lines import mark_of_line_stamps, stamp_apart
+from fogml.runs.logger_lines import frames_checked, is_frame, mark_of_line_stamps, stamp_apart
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.yaml_text import parse_yaml
 
@@ -49,7 +49,9 @@ class Field:
 def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] | None]:
     """The layout's keys, the fields of a text file, and what is said above them of the interval [s]."""
     head, encoding = decoded_head(path)
-    stamp = mark_of_line_stamps(head.splitlines()[-MOST_ROWS:])
+    last = head.splitlines()[-MOST_ROWS:]
+    stamp, has_sums = mark_of_line_stamps(last), 2 * sum(map(is_frame, last)) > len(last)
+    head = frames_checked(head.encode()).decode() if has_sums else head
     name, lines, data, is_broken = _table_of(head, stamp)
     mark = SEPARATORS[name]
     if data is None:
@@ -61,6 +63,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
     marks = marks_of(CsvSource(path), rows, mark or " ")
     layout = [f"line_stamp: {as_yaml(stamp)}"] if stamp is not None else []
     layout += [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
+    layout += ["checksum: true"] if has_sums else []
     if encoding not in ("utf-8-sig", "utf-8"):
         doubt = (
             ""
@@ -82,7 +85,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
             told = as_yaml(lines[header.line].strip()[:60])
             layout.append(f"header_text: {told}    # the header is the first line that holds this")
         fields = [Field(cell.strip(' "'), *parse_header(right)) for cell, right in header.cells]
-    below = is_broken or _are_below(path, encoding, mark, rows, stamp)
+    below = is_broken or _are_below(path, encoding, mark, rows, stamp, has_sums)
     with_units = header is not None and header.with_units and not header.is_by_place
     if with_units or below:
         keys = ["not_numbers: true", *(["wrong_field_count: true"] if below else [])]
@@ -156,11 +159,17 @@ def _are_names(cells: Sequence[str]) -> bool:
 
 
 def _are_below(
-    path: Path, encoding: str, mark: str | None, rows: Sequence[Sequence[str]], stamp: str | None
+    path: Path,
+    encoding: str,
+    mark: str | None,
+    rows: Sequence[Sequence[str]],
+    stamp: str | None,
+    has_sums: bool,
 ) -> bool:
     """Whether lines other than of numbers stand below them, or such as lack one that every row has."""
     wide = encoding if encoding.startswith("utf-16") else None
     tail = CsvSource(path, wide).tail(_TAIL_BYTES).decode(errors="replace").rstrip("\0")
+    tail = frames_checked(tail.encode()).decode() if has_sums else tail
     tail = tail if stamp is None else stamp_apart(tail, stamp, mark)
     lines = [_split(line, mark) for line in re.split(r"\r\n|\r|\n", tail)[1:] if line.strip()]
     width = len(rows[0])

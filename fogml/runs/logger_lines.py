@@ -79,11 +79,36 @@ def stamp_apart(text: str, mark: str, separator: str | None) -> str:
     return re.sub(_LINE_STAMP + re.escape(mark), lambda found: found[1] + (separator or "\t"), text)
 
 
-def stamps_apart(content: bytes, layout: TextLayout) -> bytes:
-    """A part of a text with its lines' stamps as fields of their own, where the layout tells of some."""
-    if layout.line_stamp is None:
-        return content
-    return stamp_apart(content.decode(), layout.line_stamp, layout.text_separator).encode()
+def plain_lines(content: bytes, layout: TextLayout) -> bytes:
+    """A part of a text with its lines' stamps as fields of their own and sums checked, as the layout says."""
+    if layout.line_stamp is not None:
+        content = stamp_apart(content.decode(), layout.line_stamp, layout.text_separator).encode()
+    return frames_checked(content) if layout.checksum else content
+
+
+_FRAME = re.compile(rb"\$([^$*\n]*)\*([0-9A-Fa-f]{2})[ \t\r]*\Z")
+
+
+def is_frame(line: str) -> bool:
+    """Whether a line ends as a frame of NMEA 0183 does: a ``$``, what is told, a ``*`` and two digits."""
+    return _FRAME.search(line.encode()) is not None
+
+
+def frames_checked(content: bytes) -> bytes:
+    """Lines with a ``$`` without the sum at their end; those whose sum is wrong or lost as ``*`` alone.
+
+    It is the exclusive or of all bytes between ``$`` and ``*`` (NMEA 0183).
+    """
+    sums = np.bitwise_xor.accumulate(np.frombuffer(content, dtype=np.uint8))
+
+    def checked(line: re.Match[bytes]) -> bytes:
+        found = _FRAME.search(line[0])
+        if found is None:
+            return b"*"
+        before, last = (line.start() + place - 1 for place in found.span(1))
+        return line[0][: found.end(1)] if sums[before] ^ sums[last] == int(found[2], 16) else b"*"
+
+    return re.sub(rb"(?m)^.*\$.*$", checked, content)
 
 
 def mark_of_line_stamps(lines: Sequence[str]) -> str | None:
@@ -198,12 +223,25 @@ class FaultyFields(InputError):
         self.column, self.filled, self.rows = column, rows - count, rows
 
 
+_HEXADECIMAL = re.compile(r"(0[xX])?(?=.*[A-Fa-f])(?=.*\d)[0-9A-Fa-f]{2,16}")
+
+
+def hex_numbers(texts: NDArray[np.str_], bits: int) -> FloatArray:
+    """Numbers in hexadecimal of so many bits, two's complement, shape (n,); NaN where there is none."""
+    form = re.compile(r"(0[xX])?[0-9A-Fa-f]{1,16}")
+    values = [int(text, 16) if form.fullmatch(text) else -1 for text in texts.tolist()]
+    half = 1 << (bits - 1)
+    return np.array([v - 2 * half * (v >= half) if 0 <= v < 2 * half else np.nan for v in values])
+
+
 def cell_words(cell: str, first: str, is_time: bool) -> str:
     """What is wrong with a field's text; of dates with that of the first row, else an empty one."""
     if first:
         return f"{quoted(cell)} is no date and time as in the first row, {quoted(first)}"
     if is_time and stamp_form([cell]) is not None:
         return f"{quoted(cell)} is a date or time of day, which 'unit: stamp' reads"
+    if _HEXADECIMAL.fullmatch(cell):
+        return f"{quoted(cell)} is no number; where it is hexadecimal, 'hex_bits: 16' in the column says so"
     return f"{quoted(cell)} is no number" if cell else "empty, a number was expected"
 
 

@@ -23,9 +23,10 @@ from fogml.runs.logger_lines import (
     cell_words,
     field_numbers,
     field_texts,
+    hex_numbers,
     hide_quoted,
+    plain_lines,
     shown,
-    stamps_apart,
     text_parts,
 )
 from fogml.runs.other_rate import is_of_another_rate
@@ -97,8 +98,7 @@ def read_logger_text(
         If the file is missing, is no text of that encoding, is not of the profile's form, or
         holds faulty rows that the profile does not reject; the message names file and line.
     """
-    path = Path(path)
-    parts = text_parts(path, profile.encoding, part_bytes)
+    parts = text_parts(path := Path(path), profile.encoding, part_bytes)
     first = next(parts)
     cut = cut_line(CsvSource(path), profile.text_separator, profile.decimal)
     if cut is not None and not profile.reject.not_numbers:
@@ -125,7 +125,7 @@ class _Reader:
         texts: dict[str | int, list[NDArray[np.str_]]] = {}
         fields, places = 0, dict[str | int, int]()
         for content, is_last in parts:
-            lines = Lines.of(hide_quoted(stamps_apart(content, self.profile), self.profile.text_separator))
+            lines = Lines.of(hide_quoted(plain_lines(content, self.profile), self.profile.text_separator))
             is_first = self.lines_before == 0
             numbers = np.flatnonzero(self._used(lines, is_first))
             if is_first:
@@ -214,17 +214,15 @@ class _Reader:
             found = [place for place, name in enumerate(self.names) if name == source]
             if len(found) != 1:
                 fault = "no column" if not found else "more than one column"
-                raise InputError(
-                    f"{self.file}: {fault} {quoted(source)}; the header holds {listed(self.names)}; "
-                    f"{self.hint}"
-                )
+                told = f"{fault} {quoted(source)}; the header holds {listed(self.names)}"
+                raise InputError(f"{self.file}: {told}; {self.hint}")
             places[source] = found[0]
         for source, place in places.items():
             if place >= fields:
-                raise InputError(
-                    f"{self.file}: source {quoted(source)} is column {place} counted from 0, and a row has "
-                    f"{fields} fields; {self.hint}"
+                told = (
+                    f"source {quoted(source)} is column {place} counted from 0, and a row has {fields} fields"
                 )
+                raise InputError(f"{self.file}: {told}; {self.hint}")
         return places
 
     def _table(
@@ -245,6 +243,9 @@ class _Reader:
         content = lines.keep(numbers[rows])
         sources = {s: place for s, place in places.items() if s in self.profile.sources}
         values = field_numbers(content, self.profile, fields, list(sources.values()))
+        for values_of_it, (source, place) in zip(values, sources.items(), strict=True):
+            if bits := self.profile.hex_bits(source):
+                values_of_it[:] = hex_numbers(field_texts(content, self.profile, fields, place), bits)
         texts = {s: field_texts(content, self.profile, fields, places[s]) for s in self.profile.text_sources}
         seconds = self._seconds(texts)
         if self.filled is None:

@@ -39,7 +39,8 @@ class ImportColumn(Strict):
     `source` is the column's name in the file's header, or its position where there is none; of a container
     ``GROUP/FIELD``, or the field alone. The unit ``stamp`` of ``time`` says dates and times of day, in one
     column, a list of two, or one of six: year, month, day, hour, minute, second. `missing` lists values that
-    stand for none: a temperature is interpolated there, other rows are left out; both are counted.
+    stand for none: a temperature is interpolated there, other rows are left out; both are counted. `hex_bits`
+    says that the text's numbers are hexadecimal ones of so many bits, two's complement.
     """
 
     source: Source | list[Source] | None = None
@@ -47,6 +48,7 @@ class ImportColumn(Strict):
     scale: Quotient = 1.0
     offset: Quotient = 0.0
     missing: list[float] = []
+    hex_bits: int | None = Field(default=None, ge=4, le=64)
 
     @property
     def stamps(self) -> tuple[Source, ...]:
@@ -124,6 +126,7 @@ class TextLayout(Strict):
     decimal: Literal[".", ","] = "."
     signature: str | None = None
     line_stamp: str | None = Field(default=None, min_length=1)
+    checksum: bool = False
     skip_lines: int = Field(default=0, ge=0)
     header_text: str | None = Field(default=None, min_length=1)
     comment: str | None = Field(default=None, min_length=1)
@@ -147,6 +150,11 @@ class TextLayout(Strict):
         """The columns of numbers that a column of the run is read from, one of each axis."""
         number = self.columns[name].number
         return () if number is None else (number,)
+
+    def hex_bits(self, source: Source) -> int | None:
+        """Bits of the hexadecimal numbers of a source; None where they are decimal."""
+        found = (column.hex_bits for name, column in self.columns.items() if source in self.sources_of(name))
+        return next(found, None)
 
     @property
     def text_sources(self) -> tuple[Source, ...]:

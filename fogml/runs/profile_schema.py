@@ -58,6 +58,9 @@ class ImportProfile(TextLayout):
     line_stamp
         What stands between the date and time of day that a terminal program writes before each line, with
         or without a bracket, and the line: the stamp is a field of its own then, the first.
+    checksum
+        Whether lines are frames of NMEA 0183, ``$…*HH``: the sum at their end is taken off; those where it is
+        wrong or lost have no fields.
     skip_lines
         Lines left out at the top before anything else is looked at.
     comment
