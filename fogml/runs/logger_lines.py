@@ -90,8 +90,8 @@ _FRAME = re.compile(rb"\$([^$*\n]*)\*([0-9A-Fa-f]{2})[ \t\r]*\Z")
 
 
 def is_frame(line: str) -> bool:
-    """Whether a line ends as a frame of NMEA 0183 does: a ``$``, what is told, a ``*`` and two digits."""
-    return _FRAME.search(line.encode()) is not None
+    """Whether a line ends as a frame of NMEA 0183 does: a ``$``, what is told, a ``*`` and its sum."""
+    return "$" in line and frames_checked(line.encode()) != b"*"
 
 
 def frames_checked(content: bytes) -> bytes:
