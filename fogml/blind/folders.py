@@ -11,7 +11,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -174,3 +176,27 @@ def check_sums(folder: Path) -> int:
 def _digest(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def count_samples(folder: Path) -> int:
+    """Samples in all runs of a case: lines less one header each."""
+    files = case_files(folder)
+    return sum(_lines(path) - 1 for path in (*files.fit, *files.held_out))
+
+
+def not_answers(folder: str, names: list[str]) -> list[str]:
+    """What a method may leave besides files and folders: its keeper would read what the method itself can't.
+
+    ``outcome.json`` is the keeper's to write.
+    """
+
+    def is_none(name: str) -> bool:
+        kind = os.lstat(os.path.join(folder, name)).st_mode
+        return name == OUTCOME or not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
+
+    return [name for name in names if is_none(name)]
+
+
+def _lines(path: Path) -> int:
+    with path.open("rb") as file:
+        return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))

@@ -8,13 +8,13 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
-from fogml.blind.worker import READY
-from fogml.errors import InputError
+from fogml.blind.worker import ANSWERED, STARTED
+from fogml.errors import InputError, printable
 from fogml.outputs import scratch_folder
 from fogml.processes import of_this_package
 
@@ -22,6 +22,8 @@ _KEPT = ("PATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PYTHONPATH", "SYSTEMROOT"
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _START_S = 300.0
 _LOG = "log.txt"
+_LONGEST, _SHOWN = 1 << 20, 80
+# Characters of a line that a worker says, and of one that a message shows.
 
 
 class WorkerLost(Exception):
@@ -81,7 +83,7 @@ class Worker:
         if begun is not None:
             begun(self)
         try:
-            told = self._next(_START_S)
+            told = self._next(_START_S, STARTED)
             self.locks, self.code = str(told["locks"]), str(told["code"])
         except WorkerLost as lost:
             self.end()
@@ -101,7 +103,7 @@ class Worker:
             self._process.stdin.flush()
         except OSError:
             pass  # it has ended, which the reading below tells
-        return self._next(limit_s)
+        return self._next(limit_s, ANSWERED)
 
     def kill(self) -> None:
         """End the process: whoever waits for its answer meets `WorkerLost`."""
@@ -116,7 +118,7 @@ class Worker:
                 stream.close()
         self._folder.close()
 
-    def _next(self, limit_s: float) -> dict[str, Any]:
+    def _next(self, limit_s: float, told: Mapping[str, Any]) -> dict[str, Any]:
         try:
             line = self._lines.get(timeout=limit_s)
         except queue.Empty:
@@ -124,9 +126,12 @@ class Worker:
         if line is None:
             status = self._process.wait()
             raise WorkerLost("crashed", f"the process ended with status {status}{self._last_words()}")
-        answer: dict[str, Any] = json.loads(line)
-        if not answer.get(READY, True):
-            raise WorkerLost("crashed", str(answer))
+        try:
+            answer = json.loads(line)
+        except (ValueError, RecursionError):
+            answer = None
+        if not isinstance(answer, dict) or any(not isinstance(answer.get(k), t) for k, t in told.items()):
+            raise WorkerLost("crashed", f"it said what is no answer: {printable(line.strip(), _SHOWN)}")
         return answer
 
     def _last_words(self) -> str:
@@ -137,7 +142,7 @@ class Worker:
 
 def _read(stream: IO[str], lines: queue.Queue[str | None]) -> None:
     try:
-        for line in stream:
+        while line := stream.readline(_LONGEST):
             lines.put(line)
     except ValueError:
         pass  # closed by `end`

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import queue
 import shutil
 import threading
@@ -15,7 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import fogml
-from fogml.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files, read_json
+from fogml.blind.folders import (
+    DIAGNOSIS,
+    OUTCOME,
+    OUTCOME_SCHEMA,
+    BlindFolder,
+    count_samples,
+    not_answers,
+    read_json,
+)
 from fogml.blind.methods import ORACLE, code_state, load_method
 from fogml.blind.pool import Worker, WorkerLost
 from fogml.blind.worker import own_roots, within
@@ -91,6 +98,11 @@ class RunPlan:
             raise InputError("workers, threads and the time limit must be positive")
 
     @property
+    def afresh(self) -> bool:
+        """Whether each case has a process of its own: anyone's method keeps nothing of another case."""
+        return ":" in self.method
+
+    @property
     def answers(self) -> Path:
         """Where the answers go."""
         return self.into or self.folder.answers(self.name or self.method)
@@ -134,9 +146,8 @@ class _Shared:
 def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int]:
     """Answer the cases that are left; returns how many were answered now, and how many of them failed.
 
-    Each answer appears whole, so that an interrupted run goes on where it was. A case that
-    crashes its process, exceeds its time or writes no ``gap.json`` is recorded as failed, and the
-    process is started anew.
+    Each answer appears whole, so that an interrupted run goes on where it was. A case that crashes its
+    process, exceeds its time or writes no ``gap.json`` is recorded as failed, and the process started anew.
 
     Raises
     ------
@@ -216,21 +227,6 @@ def check_answers_to(answer: Path, case: Path) -> None:
         raise InputError(f"{path}: answers other files than {case} holds by now; answer the case again")
 
 
-def count_samples(folder: Path) -> int:
-    """Samples in all runs of a case: lines less one header each."""
-    files = case_files(folder)
-    return sum(_lines(path) - 1 for path in (*files.fit, *files.held_out))
-
-
-def _links(folder: str, names: list[str]) -> list[str]:
-    return [name for name in names if os.path.islink(os.path.join(folder, name))]
-
-
-def _lines(path: Path) -> int:
-    with path.open("rb") as file:
-        return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
-
-
 def _keep(shared: _Shared) -> None:
     """Take cases from the queue until none is left, with one worker after another."""
     worker: Worker | None = None
@@ -248,7 +244,7 @@ def _keep(shared: _Shared) -> None:
                         f"the sources of '{plan.method}' or of fogml changed while cases were answered; "
                         "answers of this code would stand beside those of another: run it again"
                     )
-            if not _one(shared, worker, name):
+            if not _one(shared, worker, name) or plan.afresh:
                 worker.end()
                 worker = None
     finally:
@@ -277,16 +273,21 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
         answer = {"done": False, "reason": lost.reason, "message": str(lost), "seconds": seconds}
     if shared.stop.is_set():
         return False
-    method, samples = plan.name or plan.method, count_samples(case)
+    method, samples = plan.name or plan.method, count_samples(source)
     values = outcome_of(name, method, answer, worker.locks, samples, shared.code, files)
     with folder_to_fill(plan.answers), whole_folder(plan.answers, shared=True) as staging:
-        # A link that a method leaves would have its keeper read what the method itself can't.
-        shutil.copytree(out, staging / name, ignore=_links)
+        try:
+            if out.is_dir() and not out.is_symlink():
+                shutil.copytree(out, staging / name, ignore=not_answers)
+        except OSError as error:
+            shutil.rmtree(staging / name, ignore_errors=True)
+            values |= {"done": False, "reason": "no answer", "message": f"it can't be read: {error}"}
+        (staging / name).mkdir(exist_ok=True)
         write_json(staging / name / OUTCOME, values, indent=1)
-    shutil.rmtree(case)
-    shutil.rmtree(out)
+    shutil.rmtree(case, ignore_errors=True)
+    shutil.rmtree(out, ignore_errors=True)
     with shared.lock:
-        shared.failed += not answer["done"]
+        shared.failed += not values["done"]
         if shared.progress:
             shared.progress(name)
     return usable

@@ -3,10 +3,11 @@
 ``python -m fogml.blind.worker METHOD [CODE_FOLDER]`` in the folder that it may use; METHOD is
 ``package.module:function``, called with `CaseFiles`, the folder for its answer, and options.
 
-It can't reach the truth: it may read its own code and one folder, and nothing else. Two locks. An audit
-hook (PEP 578) refuses every open, listing and child process that Python knows of outside the allowed
-folders, on any system. Where the kernel has Landlock (Linux 5.13 and later) it refuses the same to code
-below Python, threads and children included. Neither is told where the truth lies.
+It can't reach the truth: it may read its own code and one folder, write to that folder alone, and reach no
+network. Two locks. An audit hook (PEP 578) refuses every open, listing, connection and child process that
+Python knows of outside the allowed folders, on any system. Where the kernel has Landlock (Linux 5.13 and
+later) it refuses the same to code below Python, threads and children included: TCP since Linux 6.7, signals
+to other processes since 6.12. Neither is told where the truth lies.
 """
 
 from __future__ import annotations
@@ -19,23 +20,39 @@ import sysconfig
 import time
 import traceback
 from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from fogml.processes import begin_worker
 
-_SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc", "/proc", "/sys", "/dev", "/nix/store")
-_OPENING = {
-    "open",
-    "os.listdir",
-    "os.scandir",
-    "os.chdir",
-    "os.truncate",
-    "os.remove",
-    "os.rmdir",
-    "os.mkdir",
-}
+_SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc", "/sys", "/dev", "/nix/store")
+_PROC = ("self", "cpuinfo", "meminfo", "stat", "loadavg", "version", "filesystems", "mounts", "sys")
+# Of other processes nothing: their environment holds what they were told.
+_KERNELS = (
+    "fogml.signals.allan_kernel",
+    "fogml.signals.modes",
+    "fogml.signals.random_noise",
+    "fogml.signals.recursions",
+    "fogml.signals.sine_kernel",
+    "fogml.signals.whitening_kernels",
+    "fogml.signals.window_kernels",
+    "fogml.models.rbf.evaluate",
+)
+# Numba takes what was compiled before from a folder that it could write to when the module was loaded.
+_LISTING = {"os.listdir", "os.scandir", "os.chdir"}
+_CHANGING = {"os.truncate", "os.remove", "os.rmdir", "os.mkdir", "os.chmod", "os.chown", "os.utime"}
 _PAIRS = {"os.rename", "os.link", "os.symlink"}
+_WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+_TALKING = {
+    "socket.connect",
+    "socket.bind",
+    "socket.sendto",
+    "socket.sendmsg",
+    "socket.getaddrinfo",
+    "socket.gethostbyname",
+    "socket.gethostbyaddr",
+}
 _LEAVING = {"subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "pty.spawn"}
 
 # Numbers of the system calls are the same on every architecture that Linux has them on.
@@ -46,10 +63,18 @@ _READING = _EXECUTE | _READ_FILE | _READ_DIR
 # Rights that came with each version: all of the first, moves between folders, truncation.
 _RIGHTS = {1: (1 << 13) - 1, 2: 1 << 13, 3: 1 << 14}
 _FILE_RIGHTS = _EXECUTE | _WRITE_FILE | _READ_FILE | _RIGHTS[3]
+_TCP, _TCP_SINCE = 3, 4
+# To bind and to connect.
+_SCOPES, _SCOPES_SINCE = 3, 6
+# Sockets without a file, and signals, of processes that are not shut in.
 
 
 class _RulesetAttributes(ctypes.Structure):
-    _fields_ = [("handled_access_fs", ctypes.c_uint64)]
+    _fields_ = [
+        ("handled_access_fs", ctypes.c_uint64),
+        ("handled_access_net", ctypes.c_uint64),
+        ("scoped", ctypes.c_uint64),
+    ]
 
 
 class _PathBeneath(ctypes.Structure):
@@ -63,12 +88,12 @@ class OutOfReach(PermissionError):
 
 
 def own_roots() -> tuple[Path, ...]:
-    """Folders that any sealed process may read: Python, installed packages, this one, the system's."""
+    """What any sealed process may read: Python, packages, this one, the system's, what tells of itself."""
     import fogml
 
     stated = [sys.prefix, sys.base_prefix, sys.exec_prefix, *sysconfig.get_paths().values(), *_SYSTEM]
-    stated.append(str(Path(fogml.__file__).parent))
-    return tuple(sorted({Path(os.path.realpath(path)) for path in stated if os.path.isdir(path)}))
+    stated += [str(Path(fogml.__file__).parent), *(f"/proc/{name}" for name in _PROC)]
+    return tuple(sorted({Path(os.path.realpath(path)) for path in stated if os.path.exists(path)}))
 
 
 def within(path: str | Path, roots: Iterable[Path]) -> bool:
@@ -87,31 +112,34 @@ def seal(folder: Path, more: Iterable[Path] = ()) -> str:
     more
         Further folders of code that it may read.
     """
-    import fogml
-
     roots = tuple({*own_roots(), *(Path(os.path.realpath(path)) for path in more)})
-    # Compiled code is kept beside its source.
-    writable = (Path(os.path.realpath(folder)), Path(os.path.realpath(fogml.__file__)).parent, Path("/dev"))
+    writable = (Path(os.path.realpath(folder)), Path("/dev/null"))
     locked = _landlock(roots, writable)
-    sys.addaudithook(_hook((*roots, *writable)))
+    sys.addaudithook(_hook((*roots, *writable), writable))
     return "landlock and audit" if locked else "audit"
 
 
-def _hook(allowed: tuple[Path, ...]) -> Any:
-    def check(path: Any) -> None:
+def _hook(readable: tuple[Path, ...], writable: tuple[Path, ...]) -> Any:
+    def check(path: Any, allowed: tuple[Path, ...] = writable) -> None:
         # Descriptors that are open already were checked when they were opened.
         if path is None or isinstance(path, int) or within(os.fsdecode(path), allowed):
             return
-        raise OutOfReach(f"{os.fsdecode(path)}: out of reach of a sealed diagnosis")
+        raise OutOfReach(f"{os.fsdecode(path)}: out of reach of a sealed method")
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
-        if event in _OPENING:
-            check(arguments[0] if arguments else None)
-        elif event in _PAIRS:
+        if event == "open":
+            check(arguments[0], writable if (arguments[2] or 0) & _WRITES else readable)
+        elif event in _LISTING:
+            check(arguments[0] if arguments else None, readable)
+        elif event in _CHANGING:
             check(arguments[0])
+        elif event in _PAIRS:
+            check(arguments[0], readable if event == "os.symlink" else writable)
             check(arguments[1])
+        elif event in _TALKING:
+            raise OutOfReach(f"{event}: a sealed method reaches no network")
         elif event in _LEAVING:
-            raise OutOfReach(f"{event}: a sealed diagnosis starts no other process")
+            raise OutOfReach(f"{event}: a sealed method starts no other process")
 
     return hook
 
@@ -127,8 +155,11 @@ def _landlock(readable: Iterable[Path], writable: Iterable[Path]) -> bool:
     if version < 1:
         return False
     everything = sum(rights for since, rights in _RIGHTS.items() if since <= version)
-    attributes = _RulesetAttributes(everything)
-    size = ctypes.c_size_t(ctypes.sizeof(attributes))
+    attributes = _RulesetAttributes(
+        everything, _TCP * (version >= _TCP_SINCE), _SCOPES * (version >= _SCOPES_SINCE)
+    )
+    # An older kernel takes the fields that it knows.
+    size = ctypes.c_size_t(8 + 8 * (version >= _TCP_SINCE) + 8 * (version >= _SCOPES_SINCE))
     ruleset = call(_CREATE_RULESET, ctypes.byref(attributes), size, ctypes.c_uint32(0))
     if ruleset < 0:
         return False
@@ -155,7 +186,15 @@ def _allow(call: Any, ruleset: int, path: Path, rights: int) -> None:
         os.close(descriptor)
 
 
-READY = "ready"
+STARTED = {"locks": str, "code": str}
+ANSWERED = {
+    "case": str,
+    "done": bool,
+    "reason": str | None,
+    "message": str,
+    "seconds": float,
+}
+"""What a worker says once it is ready, and to each case, with the kinds of the values."""
 
 
 def main(arguments: list[str]) -> int:
@@ -166,12 +205,14 @@ def main(arguments: list[str]) -> int:
     # What a library prints must not end up among the answers.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
+    for module in _KERNELS:
+        import_module(module)
     locks = seal(home, code)
     sys.path[:0] = [str(path) for path in code]
     from fogml.blind.methods import code_state, load_method
 
     method = load_method(arguments[0])
-    _say(answers, {READY: True, "locks": locks, "code": code_state(arguments[0], *code)})
+    _say(answers, {"locks": locks, "code": code_state(arguments[0], *code)})
     for line in sys.stdin:
         _say(answers, _answer(method, home, line))
     return 0

@@ -15,15 +15,19 @@ import fogml
 from fogml.blind.folders import BlindFolder
 from fogml.blind.methods import code_state, load_method
 from fogml.blind.run import RunPlan, check_answers_to, check_out_of_reach, run_cases
-from fogml.blind.worker import own_roots
+from fogml.blind.worker import _KERNELS, own_roots
 from fogml.cli.blind import RunSettings
 from fogml.cli.blind_job import run_and_tell
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 
 CHEAT = """
-import ctypes, json, os, subprocess
+import ctypes, json, os, shutil, socket, subprocess
 from pathlib import Path
+
+import fogml
+
+SEEN = []
 
 def ways(truth):
     link = Path("link")
@@ -40,6 +44,15 @@ def ways(truth):
     yield "system", lambda: os.system(f"cat {truth}/0001.json")
     yield "child", lambda: subprocess.run(["cat", truth / "0001.json"])
     yield "fork", lambda: os.fork()
+    own = Path(fogml.__file__).parent
+    yield "write to the package", lambda: (own / "blind/zz_written.txt").write_text("x")
+    yield "write where compiled code is kept", lambda: (own / "blind/__pycache__/zz.pyc").write_text("x")
+    yield "change of the package", lambda: os.utime(own / "blind/run.py")
+    yield "memory of all", lambda: Path("/dev/shm/zz_written").write_text("x")
+    yield "parent's environment", lambda: open(f"/proc/{os.getppid()}/environ").read()
+    yield "connect", lambda: socket.create_connection(("127.0.0.1", 9), 1.0)
+    yield "listen", lambda: socket.socket().bind(("127.0.0.1", 0))
+    yield "datagram", lambda: socket.socket(type=socket.SOCK_DGRAM).sendto(b"x", ("127.0.0.1", 9))
 
 def below_python(truth):
     library = ctypes.CDLL(None, use_errno=True)
@@ -64,6 +77,32 @@ def links(case, out):
     elsewhere = (Path(__file__).parent / "where.txt").read_text()
     ctypes.CDLL(None).symlink(f"{elsewhere}/0001.json".encode(), str(out / "gap.json").encode())
     ctypes.CDLL(None).symlink(elsewhere.encode(), str(out / "more").encode())
+
+def remembers(case, out):
+    SEEN.append(case.name)
+    (out / "gap.json").write_text(json.dumps(SEEN))
+
+def said(text):
+    for descriptor in range(3, 20):
+        try:
+            os.write(descriptor, text)
+        except OSError:
+            pass
+
+def strays(case, out):
+    (out / "gap.json").write_text("{}")
+    if case.name == "0001":
+        os.mkfifo(out / "pipe")
+        (out / "outcome.json").mkdir()
+    if case.name == "0002":
+        shutil.rmtree(out)
+        shutil.rmtree(case.fit[0].parent)
+    if case.name == "0003":
+        said(b"nothing\\n")
+    if case.name == "0004":
+        said(b"[1]\\n")
+    if case.name == "0005":
+        said(b'{"done": true}\\n')
 
 def ends(case, out):
     if case.name == "0002":
@@ -117,6 +156,24 @@ def test_a_keeper_follows_no_link_of_a_method(folder: BlindFolder, tmp_path: Pat
     assert run_cases(plan) == (1, 1)
     assert outcome(plan, "0001")["reason"] == "no answer"
     assert [path.name for path in (plan.answers / "0001").iterdir()] == ["outcome.json"]
+
+
+def test_each_case_of_anyones_method_has_a_process_of_its_own(folder: BlindFolder, tmp_path: Path) -> None:
+    plan = RunPlan(folder, "cheat:remembers", name="all", code=tmp_path / "code", only=("0001", "0002"))
+    assert run_cases(plan) == (2, 0)
+    for name in plan.only or ():
+        assert json.loads((plan.answers / name / "gap.json").read_text()) == [name]
+
+
+def test_what_a_method_leaves_or_says_ends_no_other_case(folder: BlindFolder, tmp_path: Path) -> None:
+    plan = RunPlan(folder, "cheat:strays", name="strays", code=tmp_path / "code", workers=2)
+    assert run_cases(plan) == (6, 4)
+    assert [path.name for path in sorted((plan.answers / "0001").iterdir())] == ["gap.json", "outcome.json"]
+    assert outcome(plan, "0001")["done"] is True and outcome(plan, "0006")["done"] is True
+    assert outcome(plan, "0002")["reason"] == "no answer"
+    for name, told in (("0003", "nothing"), ("0004", "[1]"), ("0005", '{"done": true}')):
+        assert outcome(plan, name)["reason"] == "crashed"
+        assert outcome(plan, name)["message"] == f"it said what is no answer: {told}"
 
 
 def test_failures_are_recorded_and_the_rest_goes_on(folder: BlindFolder, tmp_path: Path) -> None:
@@ -221,3 +278,10 @@ def test_the_cost_of_a_false_name_is_asked_of_the_diagnosis_alone(folder: BlindF
 def test_a_method_that_is_the_diagnosis_itself_is_said_to_be() -> None:
     with pytest.raises(InputError, match="it is what 'diagnosis' does"):
         load_method("families")
+
+
+def test_what_is_compiled_is_loaded_before_a_process_is_shut_in() -> None:
+    package = Path(fogml.__file__).parent
+    made = {path for path in package.rglob("*.py") if "fogml.signals.compiled import" in path.read_text()}
+    named = {f"fogml.{'.'.join(path.relative_to(package).with_suffix('').parts)}" for path in made}
+    assert set(_KERNELS) == named
