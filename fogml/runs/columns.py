@@ -60,8 +60,13 @@ _AMBIGUOUS = re.compile(r"grads?\b", re.IGNORECASE)
 _NAMES_OF_ANGLES = re.compile(r"[a-z]*(degree|radian|arcminute|arcsecond|turn|grade)\Z")
 
 
+_MISREAD_DEGREE = re.compile(r"Â°|[øo¡](?<![A-Za-z].)(?=C\b|/(?:h|s|hr|sec|min)\b)")
+"""A sign of degrees in UTF-8, code page 437 or MacRoman that was read as another; a letter in its place."""
+
+
 def signs(text: str) -> str:
     """Text with one sign for each of degree, micro, minus; full-width letters as plain ones, ℃ as °C."""
+    text = _MISREAD_DEGREE.sub("°", text)
     return unicodedata.normalize("NFKC", text.translate(_SIGNS)).translate(_SIGNS).strip()
 
 
@@ -72,7 +77,7 @@ def canonical_unit(unit: str) -> str:
     >>> [canonical_unit(unit) for unit in ("℃", "˚/h", "DEG/HR", "dps", "G", "g")]
     ['degC', 'deg/h', 'deg/h', 'deg/s', 'G', 'g']
     """
-    plain = signs(unit).replace("°", "deg")
+    plain = re.sub(r"\bdeg\. ?", "deg", signs(unit).replace("°", "deg"))
     if plain in _SPELLINGS:
         return plain
     word = re.sub(r"\s+", "", re.sub(r"\bper\b", "/", plain.lower()))

@@ -11,12 +11,12 @@ from pathlib import Path
 from fogml.errors import InputError, printable
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.csv_header import fields_of, header_over_lines
-from fogml.runs.csv_source import CsvSource, Marks, csv_source, marks_of, number
+from fogml.runs.csv_source import CsvSource, Marks, csv_source, is_binary, marks_of, number
 from fogml.runs.encodings import encoding_of
-from fogml.runs.header_spelling import DATE_NAMES
+from fogml.runs.header_spelling import DATE_NAMES, MILLISECOND_NAMES
 from fogml.runs.raw_table import empty_file, wanted_cells
 from fogml.runs.stamp_forms import FRACTION, StampForm
-from fogml.runs.stamps import Stamps, stamps_of
+from fogml.runs.stamps import MILLISECONDS, Stamps, stamps_of
 
 _HEAD_BYTES = 1 << 16
 _LINE_END = re.compile(r"\r\n|\r|\n")
@@ -175,7 +175,7 @@ def decoded_head(path: Path) -> tuple[str, str]:
     source = csv_source(path, raw)
     with source.open() as opened:
         head = opened.read(_HEAD_BYTES)
-    if any(byte < 32 and byte not in b"\t\r\n\f" for byte in head[:1000]):
+    if is_binary(head[:1000].decode("latin-1")):
         raise _no_text(path.name)
     encoding = encoding_of(head, len(head) == _HEAD_BYTES)
     text = head.decode(encoding, errors="replace")
@@ -231,7 +231,21 @@ def _clock(
         columns = (*stamps.columns[:-1], (whole, form), (whole + 1, StampForm(FRACTION)))
         named = (*cells[:place], "time of day", "time [s]", *cells[place + 1 :])
         return named, replace(begin, columns=tuple((i, f) for i, f in columns))
+    if (first := _milliseconds(cells, rows, place)) is not None:
+        columns = (*stamps.columns, (place + 1, StampForm(FRACTION, part_digits=3)))
+        named = (*cells[:place], "time of day", "time [s]", *cells[place + 2 :])
+        return named, replace(stamps, columns=columns, first_ns=stamps.first_ns + first * 1_000_000)
     return (*cells[:place], "time [s]", *cells[place + 1 :]), stamps
+
+
+def _milliseconds(cells: Sequence[str], rows: Sequence[Sequence[str]], place: int) -> int | None:
+    """The first row's milliseconds where a column of them stands right of times of day; else None."""
+    names = [parse_header(cell)[0].lower() for cell in cells[place + 1 : place + 2]]
+    texts = [row[place + 1].strip() for row in rows if len(row) >= len(cells) > place + 1]
+    if not texts or not set(names) <= MILLISECOND_NAMES:
+        return None
+    fits = [bool(re.fullmatch(MILLISECONDS, text)) for text in texts]
+    return int(texts[0]) if fits[0] and 2 * sum(fits) > len(fits) else None
 
 
 def _fractions(rows: Sequence[Sequence[str]], width: int, place: int) -> int | None:

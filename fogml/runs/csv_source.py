@@ -101,6 +101,16 @@ class CsvSource:
         return replace(self, end=self.stop - len(text.encode(self.wide or encoding, "surrogateescape")))
 
 
+_MOST_CONTROLS = 0.05
+"""Share of control characters from which on a text is none: a bad line makes a few, UTF-16 by bytes half."""
+
+
+def is_binary(start: str) -> bool:
+    """Whether the beginning of a file is no text."""
+    controls = sum(ord(sign) < 32 and sign not in "\t\r\n\f" for sign in start)
+    return controls > _MOST_CONTROLS * len(start)
+
+
 def csv_source(path: Path, head: bytes) -> CsvSource:
     """How a file is to be opened, told from its first bytes and its last ones."""
     wide = _BYTE_ORDER_MARKS.get(head[:2])

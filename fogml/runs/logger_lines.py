@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fogml.arrays import FloatArray, IndexArray
 from fogml.arrow_arrays import takes_threads, values_of
 from fogml.errors import InputError, counted, quoted
+from fogml.runs.csv_source import is_binary
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.raw_table import empty_file
 from fogml.runs.stamp_forms import stamp_form
@@ -36,10 +37,10 @@ def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[byt
                 text = _decoded(path, decoder, raw, read, encoding)
                 if read == 0:
                     text = text.removeprefix("\ufeff")
-                    if "\0" in text[:4096]:
+                    if is_binary(text[:4096]):
                         raise InputError(f"{path.name}: this is a binary file, a text file was expected")
                     only_returns = "\r" in text and "\n" not in text
-                text = text.replace("\r", "\n") if only_returns else text
+                text = (text.replace("\r", "\n") if only_returns else text).replace("\0", " ")
                 read += len(raw)
                 content = begun + text.encode()
                 end = content.rfind(b"\n") + 1

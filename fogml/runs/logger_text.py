@@ -31,7 +31,7 @@ from fogml.runs.logger_lines import (
 )
 from fogml.runs.other_rate import is_of_another_rate
 from fogml.runs.profile_parts import TextLayout
-from fogml.runs.stamps import PARTS, StampClock, Stamps, stamps_of, stamps_of_parts
+from fogml.runs.stamps import StampClock, Stamps, stamps_of, whole_stamps
 from fogml.signals import large
 
 _SIGNATURE_LINES = 20
@@ -309,8 +309,7 @@ class _Reader:
 
         if not (places := self.profile.stamps):
             return None
-        columns = [texts[place].tolist() for place in places]
-        columns = [stamps_of_parts(columns)] if len(columns) == PARTS else columns
+        columns = whole_stamps([texts[place].tolist() for place in places])
         if self.clock is None:
             stamps = stamps_of(list(enumerate(columns)), self.profile.reject.not_numbers, digits=True)
             if stamps is None:

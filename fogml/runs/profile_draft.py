@@ -15,7 +15,7 @@ from fogml.readers.beside import tells_interval
 from fogml.runs.columns import column_spec, conversion, is_accepted, parse_header
 from fogml.runs.container_files import groups_of
 from fogml.runs.draft_layout import MOST_ROWS, Field, as_yaml, text_layout
-from fogml.runs.header_spelling import face_of
+from fogml.runs.header_spelling import MILLISECOND_NAMES, face_of
 from fogml.runs.opening import opened
 from fogml.runs.possible import digits_of_clock
 from fogml.runs.raw_table import vector_fault
@@ -25,7 +25,7 @@ from fogml.runs.stamp_forms import stamp_form
 from fogml.runs.stamps import PARTS, stamps_of_parts
 
 _TIME = re.compile(r"time|stamp|clock|zeit|epoch|tick|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
-_COUNT = re.compile(r"sample|index|count|packet|seq|row|scan|record|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
+_COUNT = re.compile(r"#|sample|index|count|packet|seq|row|scan|record|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
 _DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
 _GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
 _WARM = re.compile(r"temp|die|oven|therm|^t(\w{0,3}|[_.]\w*)$|温", re.IGNORECASE)
@@ -208,6 +208,7 @@ def _clock(left: list[Field]) -> list[str]:
         whole = [f for f, kind in stamped if kind.startswith("date and")]
         parts = [[f for f, kind in stamped if (kind == "date") is is_date][:1] for is_date in (True, False)]
         used = whole[:1] or [f for part in parts for f in part]
+        used += [f for f in _taken(left, lambda f: f.name.lower() in MILLISECOND_NAMES) if len(f.first)][:1]
         shown = [as_yaml(f.source) for f in used]
         timed = [f for f in left if _grows(f) and f.unit is not None and is_accepted("time", f.unit)]
         others = ", ".join(as_yaml(f.source) for f in (*(f for f, _ in stamped), *timed) if f not in used)

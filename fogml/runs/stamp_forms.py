@@ -260,6 +260,7 @@ def _seconds(parts: dict[str, Any], part_digits: int) -> tuple[IntArray, BoolArr
     hour = np.where(values_of(compute.equal(half, "")), hour, hour % 12 + 12 * is_late)
     fraction = compute.fill_null(parts["F"], "")
     if part_digits:
+        wrong |= values_of(compute.greater(compute.utf8_length(fraction), part_digits))
         fraction = compute.utf8_lpad(fraction, part_digits, "0")
     fraction = _whole(compute.utf8_rpad(fraction, 9, "0"))
     return (

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 
 _OPEN_DATES = {"?": "day and month", "y?": "day and year"}
+MILLISECONDS = r"\d{1,3}"
 PARTS = 6
 """Columns of a clock that has one for each of year, month, day, hour, minute and second."""
 
@@ -141,6 +142,21 @@ def stamps_of(
         first += int(found[0])
     shown = [re.match(FORMS[form.kind], texts[0]) for (_, form), (_, texts) in zip(known, columns)]
     return Stamps(known, first, any(match is not None and match.groupdict().get("z") for match in shown))
+
+
+def whole_stamps(columns: list[list[str]]) -> list[list[str]]:
+    """Texts of stamps, n of each column: of six their parts, of up to three the last may be milliseconds."""
+    if len(columns) == PARTS:
+        return [stamps_of_parts(columns)]
+    *before, last = columns
+    if not before or not last or not re.fullmatch(MILLISECONDS, last[0].strip()):
+        return columns
+    # What is no number of milliseconds makes no stamp.
+    parts = (part.strip() if re.fullmatch(MILLISECONDS, part.strip()) else "?" for part in last)
+    return [
+        *before[:-1],
+        [f"{text.strip()}.{part:>03}" for text, part in zip(before[-1], parts, strict=True)],
+    ]
 
 
 def stamps_of_parts(parts: Sequence[Sequence[str]]) -> list[str]:

@@ -83,3 +83,13 @@ def test_the_same_header_again_is_a_line_to_leave_out(tmp_path):
     np.testing.assert_array_equal(run.time, TIME)
     units_apart = file_with(tmp_path / "b.csv", "time,gyro,T", header="time,gyro,T\ns,deg/h,degC")
     np.testing.assert_array_equal(read_run(units_apart, repair=True).time, TIME)
+
+
+@pytest.mark.parametrize("place", [0, 300, 2000])
+def test_noise_of_a_line_costs_the_rows_it_hits_and_no_others(tmp_path, place):
+    content = ("\n".join([*ROWS, ""])).encode()
+    path = tmp_path / "a.txt"
+    at = content.rfind(b"\n", 0, place) + 1
+    path.write_bytes(content[:at] + b"\x00\xfe\x07\xf0ga,rb,\n" + content[at:])
+    (run,) = drafted(path)
+    np.testing.assert_array_equal(run.time, TIME)

@@ -346,7 +346,7 @@ OWN = LOGGER.replace("source: t,", "source: time,")
     ("old", "new", "told"),
     [
         ("100;", '"100;', r", line 3, column 'time': '\"100.*' is no number \(1 such row\)"),
-        ("100;", "1\x0000;", "binary file"),
+        ("100;", "1\x0000;", "'1 00' is no number"),
         ("100;", "100\r;", None),
         ("0,25;", "0,\r25;", "line 3, column 'rate': .*is no number|line 3, column 'rate'"),
         ("0,25;", "1e400;", "line 3, column 'rate': '1e400'|no finite number"),

@@ -168,3 +168,30 @@ def test_a_draft_takes_times_in_digits_for_stamps_and_plain_numbers_for_none(tmp
     (tmp_path / "p.yaml").write_text(PROFILE.format("utc"))
     with pytest.raises(InputError, match=r"line 62, column 'utc': '086100' is no date and time"):
         import_recording(wrong, load_profile(tmp_path / "p.yaml"))
+
+
+@pytest.mark.parametrize("step_ms", [250, 1010])
+@pytest.mark.parametrize("header", ["Date,Time,ms", "Date,Time,Millisecond", "Timestamp,msec"])
+def test_milliseconds_in_a_column_of_their_own_belong_to_the_clock(tmp_path, header, step_ms):
+    """At a sample a second they were left aside, and times up to 1 s off."""
+    at = [datetime(2026, 3, 11, 8) + timedelta(milliseconds=5 + step_ms * i) for i in range(COUNT)]
+    form = "%d.%m.%Y,%H:%M:%S," if "Date" in header else "%Y-%m-%d %H:%M:%S,"
+    texts = [moment.strftime(form) + str(moment.microsecond // 1000) for moment in at]
+    path = log(tmp_path / "a.csv", texts, f"{header},gyro [deg/h],T [degC]")
+    run = read_run(path)
+    np.testing.assert_allclose(run.time, 1e-3 * step_ms * np.arange(COUNT), atol=1e-9)
+    assert run.facts.started == at[0]
+    (tmp_path / "p.yaml").write_text(draft_profile(path))
+    (run,) = import_recording(path, load_profile(tmp_path / "p.yaml"))
+    np.testing.assert_allclose(run.time, 1e-3 * step_ms * np.arange(COUNT), atol=1e-9)
+    texts[40] += "x"
+    with pytest.raises(InputError, match="line 42, column 'time"):
+        read_run(log(tmp_path / "b.csv", texts, f"{header},gyro [deg/h],T [degC]"))
+    with pytest.raises(InputError, match="line 42, column"):
+        import_recording(tmp_path / "b.csv", load_profile(tmp_path / "p.yaml"))
+
+
+def test_a_count_of_milliseconds_that_goes_on_is_no_part_of_a_second(tmp_path):
+    texts = [f"08:00:{i // 1000:02d},{i}" for i in range(1400)]
+    with pytest.raises(InputError, match="column 'time', line 1002: the value is missing"):
+        read_run(log(tmp_path / "a.csv", texts, "Time,ms,gyro [deg/h],T [degC]"))

@@ -84,3 +84,13 @@ def test_angles_of_a_sample_are_refused_with_the_profile_that_makes_rates_of_the
     (run,) = import_recording(path, profile)
     in_degrees = {"arcsec": 1.0 / 3600.0, "deg": 1.0, "urad": np.degrees(1e-6)}[unit]
     np.testing.assert_allclose(run.gyro, 3600.0 * angles * in_degrees / 0.5, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("unit", "known"),
+    [("Â°C", "degC"), ("øC", "degC"), ("¡/h", "deg/h"), ("oC", "degC"), ("o/s", "deg/s"), ("deg. C", "degC"),
+     ("deg./h", "deg/h"), ("°С", "degC"), ("град/ч", "deg/h"), ("kat/h", "kat/h"), ("pro/s", "pro/s")],
+)  # fmt: skip
+def test_signs_of_degrees_that_were_read_as_others(unit, known):
+    """As files in code page 437, MacRoman or UTF-8 show them where they are read as Latin-1."""
+    assert canonical_unit(unit) == known
