@@ -38,9 +38,10 @@ class ImportColumn(Strict):
 
     `source` is the column's name in the file's header, or its position where there is none; of a container
     ``GROUP/FIELD``, or the field alone. The unit ``stamp`` of ``time`` says dates and times of day, in one
-    column, a list of two, with one of milliseconds behind, or one of six: year, month, day, hour, minute, second. `missing` lists values that
-    stand for none: a temperature is interpolated there, other rows are left out; both are counted. `hex_bits`
-    says that the text's numbers are hexadecimal ones of so many bits, two's complement.
+    column, a list of two, with one of milliseconds behind, or one of six: year, month, day, hour, minute,
+    second. `missing` lists values that stand for none: a temperature is interpolated there, other rows are
+    left out; both are counted. `hex_bits` says that the text's numbers are hexadecimal ones of so many bits,
+    two's complement.
     """
 
     source: Source | list[Source] | None = None
