@@ -20,7 +20,7 @@ from fogml.monitor.monitor_json import monitor_json
 from fogml.monitor.record import RunRecord, record_run
 from fogml.monitor.store import open_store
 from fogml.monitor.watch import watch
-from fogml.numerals import number
+from fogml.numerals import in_order_of_serial, number
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 
@@ -112,7 +112,12 @@ def _models(place: Path) -> Callable[[Run], DriftModel]:
         return lambda run: model
     fleet: dict[str, Any] = read_json(place / FLEET, "name the folder of a fleet's results")
     try:
-        folders = {(unit["unit"], unit["axis"]): unit["folder"] for unit in fleet["units"]}
+        # Beside the job that trains a unit's model there may be others, which keep none.
+        folders = {
+            (unit["unit"], unit["axis"]): folder
+            for unit in fleet["units"]
+            if (folder := place / str(unit["folder"]) / "model").is_dir()
+        }
     except (KeyError, TypeError):
         raise InputError(f"{place / FLEET}: lists no units; run the fleet again") from None
     load = cache(load_model)
@@ -123,9 +128,9 @@ def _models(place: Path) -> Callable[[Run], DriftModel]:
         if folder is None:
             raise InputError(
                 f"{run.name}: of unit '{unit}', axis '{axis}', of which {place} holds no model; state 'unit' "
-                "and 'axis' in its side file as the fleet's manifest does"
+                "and 'axis' in its side file as the fleet's manifest does, where its job is 'train'"
             )
-        return load(place / str(folder) / "model")
+        return load(folder)
 
     return of_run
 
@@ -133,8 +138,14 @@ def _models(place: Path) -> Callable[[Run], DriftModel]:
 def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
     from fogml.report.monitor_words import alarm_words, calibration_words, state_words, unit_label
 
+    # Those that changed come first: of many units not all are shown.
+    units = sorted(
+        values["units"],
+        key=lambda unit: (unit["state"] != "alarm", in_order_of_serial(unit_label(unit))),
+    )
+    shown = units[:UNITS_SHOWN]
     rows = []
-    for unit in values["units"][:UNITS_SHOWN]:
+    for unit in shown:
         last = unit["runs"][-1]
         rows.append(
             [
@@ -150,11 +161,15 @@ def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
         ["unit", "runs", "last level [deg/h]", "evidence", "state"],
         rows,
     )
-    for unit in values["units"][:UNITS_SHOWN]:
+    for unit in shown:
         label = unit_label(unit)
         calibration = "" if unit["alarms"] else calibration_words(unit)
         for text in (*map(alarm_words, unit["alarms"]), calibration, *unit["notes"]):
             if text:
                 terminal.say(f"{label}: {text}")
+    if len(units) > len(shown):
+        terminal.say(
+            f"{len(shown)} of {len(units)} units are shown, those that changed first; monitor.html holds all."
+        )
     told = values["runs"]
     terminal.say(f"{counted(told['added'], 'new run')} kept, {told['repeated']} there before")

@@ -90,11 +90,16 @@ def judged_once(units: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     What a twin leaves of a recording is another figure than what a drift model leaves.
     """
     by_job = {
-        job: {label_of(unit): unit for unit in units if unit["after"] is not None and unit["job"] == job}
+        job: {unit_of(unit): unit for unit in units if unit["after"] is not None and unit["job"] == job}
         for job in JOBS
     }
     chosen = by_job["compare"] | by_job["train"] or by_job["diagnose"]
-    return [unit for unit in units if chosen.get(label_of(unit)) is unit]
+    return [unit for unit in units if chosen.get(unit_of(unit)) is unit]
+
+
+def unit_of(unit: Mapping[str, Any]) -> tuple[str, str]:
+    """Serial number and axis apart: ``A`` with axis ``x`` is another than ``A x`` without one."""
+    return unit["unit"], unit["axis"]
 
 
 def label_of(unit: Mapping[str, Any]) -> str:

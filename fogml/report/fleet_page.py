@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 import plotly.graph_objects as go
 
-from fogml.fleet.summary import judged_once, label_of, told_of
+from fogml.fleet.summary import judged_once, label_of, told_of, unit_of
 from fogml.fleet.tasks import DONE
 from fogml.numerals import MISSING, averages, in_order_of_serial, listed, number, percent, plural
 from fogml.report import style
@@ -78,7 +78,7 @@ def _line(fleet: Mapping[str, Any]) -> dict[str, Any] | None:
 
 def _verdict(fleet: Mapping[str, Any]) -> list[str]:
     done, failed = fleet["counts"].get("done", 0), fleet["counts"].get("failed", 0)
-    what = "unit" if len(set(map(label_of, fleet["units"]))) == len(fleet["units"]) else "job"
+    what = "unit" if len(set(map(unit_of, fleet["units"]))) == len(fleet["units"]) else "job"
     sentences = []
     before, after = fleet["distribution"]["before"], fleet["distribution"]["after"]
     if before:
@@ -108,7 +108,7 @@ def _tiles(fleet: Mapping[str, Any]) -> list[Tile]:
     tiles = [
         Tile(
             "Units",
-            str(len(set(map(label_of, fleet["units"])))),
+            str(len(set(map(unit_of, fleet["units"])))),
             "",
             f"{failed} failed" if failed else "all done",
             "missed" if failed else "",

@@ -142,11 +142,18 @@ class SentenceReader:
     def duration(self) -> float:
         """A time above 0 such as ``1 h 30 min`` [s]."""
         place = self.place
-        total = self.quantity("time")
-        while _NUMBER.match(self.text, self.place):
-            total += self.quantity("time")
+        total = self._time()
         if not total > 0.0:
             self.fail("a time above 0 was expected here", place)
+        return total
+
+    def _time(self) -> float:
+        """A time such as ``1 h 30 min`` [s]; a sign belongs to the first of its parts alone."""
+        total = self.quantity("time")
+        while _NUMBER.match(self.text, self.place):
+            if self.text[self.place] in "+-":
+                self.fail("the parts of a time add up, a sign between them was not expected")
+            total += self.quantity("time")
         return total
 
     def moment(self) -> float:
@@ -161,9 +168,7 @@ class SentenceReader:
             start = self.number() * _TIME[word]
             self._skip()
         else:
-            start = self.quantity("time")
-            while _NUMBER.match(self.text, self.place):
-                start += self.quantity("time")
+            start = self._time()
         if start < 0.0:
             self.fail("a moment counts from the beginning of the step", place)
         return start

@@ -7,7 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from fogml.monitor.store import open_store
 from tests.monitor.service import write_model, write_run
+from tests.monitor.test_watch import service as records_of
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +114,29 @@ def test_a_fleet_s_models_are_found_by_unit(tmp_path, invoke_json, invoke):
     stranger = write_run(tmp_path, 6, unit="FOG-3")
     told = invoke("monitor", tmp_path, stranger, "-o", tmp_path / "out", status=2)
     assert "holds no model" in told.stderr
+
+
+def test_a_unit_s_jobs_without_a_model_hide_none(tmp_path, invoke_json):
+    """Before, the last line of a unit counted, and a fleet with reports beside models watched no run."""
+    (tmp_path / "trained").mkdir()
+    write_model(tmp_path / "trained")
+    (tmp_path / "reported").mkdir()
+    about = [{"unit": "FOG-1", "axis": "x", "folder": folder} for folder in ("trained", "reported")]
+    (tmp_path / "fleet.json").write_text(json.dumps({"units": about}))
+    told = invoke_json("monitor", tmp_path, write_run(tmp_path, 5), "-o", tmp_path / "out")
+    assert told["runs"] == {"added": 1, "repeated": 0} and not told["refused"]
+
+
+def test_of_many_units_those_that_changed_are_shown_first(service, tmp_path, invoke, monkeypatch):
+    """Before, the terminal showed the first by their names, and never said that there were more."""
+    monkeypatch.setattr("fogml.cli.monitor_job.UNITS_SHOWN", 3)
+    held = [
+        record
+        for number in (2, 9, 10, 11)
+        for record in records_of(10, unit=f"U-{number}", seed=number, step_at=6 if number == 11 else None)
+    ]
+    open_store(str(tmp_path / "store")).add(held)
+    told = invoke("monitor", service[0], "--store", tmp_path / "store", "-o", tmp_path / "out", status=1)
+    places = [told.stdout.index(f" U-{number} x ") for number in (11, 2, 9)]
+    assert places == sorted(places) and " U-10 x " not in told.stdout
+    assert "3 of 4 units are shown, those that changed first" in told.stdout

@@ -154,3 +154,16 @@ def test_a_unit_of_several_jobs_counts_once_and_by_its_model() -> None:
     compared = fleet_json([outcomes[1], *outcomes[3:]], {})["distribution"]["after"]
     assert compared["least"] == 0.9625 and compared["median"] == 1.2
     assert fleet_json(outcomes[2::3], {})["distribution"]["after"]["median"] == 8.2
+
+
+def test_units_of_like_names_both_count() -> None:
+    """``A`` with axis ``x`` and ``A x`` without one read alike: the first of them was left out."""
+
+    def outcome(name: str, axis: str, after: float) -> dict[str, Any]:
+        worst = {"run": "b.csv", "averaging_s": 100.0, "before": 9.0, "after": after, "floor": 0.1}
+        about = {"unit": name, "axis": axis, "job": "train", "folder": f"{name}-{axis}", "status": "done"}
+        return {**about, "found": {"worst": worst}}
+
+    values = fleet_json([outcome("A", "x", 1.0), outcome("A x", "", 3.0)], {})
+    assert values["distribution"]["after"]["median"] == 2.0
+    assert "2 units done" in fleet_page(values)

@@ -113,6 +113,8 @@ def test_a_step_reads_back_from_its_sentence(step: Any) -> None:
         (["fan off for 10 min"], "'fan' is an action", "fan"),
         (["hold for 1 h soon"], "was not understood", "soon"),
         (["hold for -1 h"], "a time above 0", "-1 h"),
+        (["hold for 1 h -30 min"], "a sign between them", "-30 min"),
+        ([{"hold for 1 h": ["fan off from 1 h -30 min"]}], "a sign between them", "-30 min"),
         ([{"repeat 2.5 times": ["hold for 1 h"]}], "a whole number", "2.5"),
         ([{"hold for 1 h": ["hold for 1 h"]}], "'hold' is a step", "hold"),
         ([{"hold for 1 h": ["turn at 10 deg for 1 min"]}], "a table rate needs a unit", "deg for"),
