@@ -53,9 +53,9 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         More than 1 % of the other intervals are off the median by more than a tenth.
     ``stuck_sensor``
         A temperature holds one value for over 10 min while another moves by more than 0.5 degC
-        and more than twice the sensor's resolution; or the gyro does, whose samples else differ,
-        or holds one for 60 samples and ten times as long as it does else, no table turning, or for 60
-        samples while the table's rate changes.
+        and more than twice the sensor's resolution; or the gyro does, whose samples else differ.
+        Or either, noisy else, holds one for 60 samples and ten times as long as it does else, no table
+        turning; or the gyro for 60 samples while the table's rate changes.
     ``dead_output``
         The gyro has one value in every sample.
     ``saturation``

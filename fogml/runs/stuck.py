@@ -10,6 +10,7 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import counted
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
+from fogml.runs.steps import noisy_beyond
 from fogml.runs.thermometers import resolution
 from fogml.signals import large
 
@@ -26,47 +27,51 @@ FROZEN_RATIO = 10
 _MARK_SHARE = 0.49
 _LEAST_SPELLS = 100
 _NOISY_SPELL = 2
+_LOOKED_AT = 100_000
 
 
 def stuck(run: Run) -> Iterator[Finding]:
     """Spells of one value of a thermometer, or of the gyro, that no sound sensor shows."""
-    temperatures = run.temperature_columns
     marks = _marks(run.time)
-    for name in (*temperatures, "gyro"):
-        values = run.columns[name]
-        if marks is not None and not _stays(values, marks):
-            continue
-        starts, stops, total = _long_spells(run.time, values)
-        if not len(starts):
-            continue
-        least = max(MOVED_DEGC, 2.0 * resolution(values)) if name != "gyro" else MOVED_DEGC
-        if name == "gyro":
-            # A quiet output of few steps rests at one value for long; a noisy one hardly ever.
-            spells = total - len(starts)
-            samples = len(values) - int((stops - starts).sum())
-            if spells < _LEAST_SPELLS or samples > _NOISY_SPELL * spells:
-                continue
-        others = [run.temperature(other) for other in temperatures if other != name]
-        found = [
-            i
-            for i, (a, b) in enumerate(zip(starts, stops))
-            if any(
-                np.ptp(x[a:b]) > least if name == "gyro" else _left(run.time[a:b], x[a:b], values[a], least)
-                for x in others
-            )
-        ]
-        if found:
-            first, last = int(starts[found[0]]), int(stops[found[0]]) - 1
-            times = "" if len(found) == 1 else f", and {counted(len(found) - 1, 'time')} more,"
-            message = (
-                f"'{name}' stays at {values[first]:.6g} from {run.time[first]:.10g} s to "
-                f"{run.time[last]:.10g} s{times} while a temperature moves; the sensor may be stuck"
-            )
-            count = int((stops - starts)[found].sum())
-            yield Finding("stuck_sensor", message, column=name, row=first + 1, count=count)
-            if name == "gyro":
-                return
-    yield from _frozen(run)
+    for name in (*run.temperature_columns, "gyro"):
+        told = _beside_others(run, name, marks)
+        yield from _frozen(run, name) if told is None else (told,)
+
+
+def _beside_others(run: Run, name: str, marks: IndexArray | None) -> Finding | None:
+    """Long spells of a column while a thermometer moves."""
+    values = run.columns[name]
+    if marks is not None and not _stays(values, marks):
+        return None
+    starts, stops, total = _long_spells(run.time, values)
+    if not len(starts):
+        return None
+    least = max(MOVED_DEGC, 2.0 * resolution(values)) if name != "gyro" else MOVED_DEGC
+    if name == "gyro":
+        # A quiet output of few steps rests at one value for long; a noisy one hardly ever.
+        spells = total - len(starts)
+        samples = len(values) - int((stops - starts).sum())
+        if spells < _LEAST_SPELLS or samples > _NOISY_SPELL * spells:
+            return None
+    others = [run.temperature(other) for other in run.temperature_columns if other != name]
+    found = [
+        i
+        for i, (a, b) in enumerate(zip(starts, stops))
+        if any(
+            np.ptp(x[a:b]) > least if name == "gyro" else _left(run.time[a:b], x[a:b], values[a], least)
+            for x in others
+        )
+    ]
+    if not found:
+        return None
+    first, last = int(starts[found[0]]), int(stops[found[0]]) - 1
+    times = "" if len(found) == 1 else f", and {counted(len(found) - 1, 'time')} more,"
+    message = (
+        f"'{name}' stays at {values[first]:.6g} from {run.time[first]:.10g} s to "
+        f"{run.time[last]:.10g} s{times} while a temperature moves; the sensor may be stuck"
+    )
+    count = int((stops - starts)[found].sum())
+    return Finding("stuck_sensor", message, column=name, row=first + 1, count=count)
 
 
 def _left(time: FloatArray, other: FloatArray, value: float, least: float) -> bool:
@@ -79,11 +84,11 @@ def _left(time: FloatArray, other: FloatArray, value: float, least: float) -> bo
     return len(away) > 0 and bool(time[-1] - time[away[0]] > STUCK_S)
 
 
-def _frozen(run: Run) -> Iterator[Finding]:
-    """Spells of the gyro that a noisy output makes by no chance, however short or steady the run."""
-    gyro, half = run.gyro, FROZEN_SAMPLES // 2
-    turned = "rate" in run.columns and float(np.ptp(run.columns["rate"])) > 0.0
-    same = gyro[1:] == gyro[:-1]
+def _frozen(run: Run, name: str) -> Iterator[Finding]:
+    """Spells that a noisy output or thermometer makes by no chance, however short or steady the run."""
+    values, half = run.columns[name], FROZEN_SAMPLES // 2
+    turned = name == "gyro" and "rate" in run.columns and float(np.ptp(run.columns["rate"])) > 0.0
+    same = values[1:] == values[:-1]
     if len(same) < FROZEN_SAMPLES or not same[: len(same) // half * half].reshape(-1, half).all(axis=1).any():
         return
     true = np.flatnonzero(same)
@@ -97,14 +102,20 @@ def _frozen(run: Run) -> Iterator[Finding]:
     found = np.flatnonzero(lengths >= max(FROZEN_SAMPLES, FROZEN_RATIO * ordinary))
     count = int(lengths[found].sum())
     others = len(same) - len(true) + 1 - len(found)
-    if len(found) and others >= _LEAST_SPELLS and len(gyro) - count <= _NOISY_SPELL * others:
-        first = int(starts[found[0]])
-        spells = "" if len(found) == 1 else f", and {counted(len(found) - 1, 'time')} more"
-        message = (
-            f"'gyro' stays at {gyro[first]:.6g} for {lengths[found[0]]} samples from {run.time[first]:.10g} "
-            f"s on{spells}, where else no value lasts longer than {ordinary}; the output may be stuck"
-        )
-        yield Finding("stuck_sensor", message, column="gyro", row=first + 1, count=count)
+    if not len(found) or others < _LEAST_SPELLS or len(values) - count > _NOISY_SPELL * others:
+        return
+    first, last = int(starts[found[0]]), int(starts[found[-1]] + lengths[found[-1]])
+    # A coarse thermometer changes with each sample of a fast ramp, and not in a soak.
+    moving = max(values[:first], values[last:], key=len)[:_LOOKED_AT]
+    if name != "gyro" and not noisy_beyond(moving, resolution(moving)):
+        return
+    spells = "" if len(found) == 1 else f", and {counted(len(found) - 1, 'time')} more"
+    message = (
+        f"'{name}' stays at {values[first]:.6g} for {lengths[found[0]]} samples from {run.time[first]:.10g} "
+        f"s on{spells}, where else no value lasts longer than {ordinary}; the "
+        f"{'output' if name == 'gyro' else 'sensor'} may be stuck"
+    )
+    yield Finding("stuck_sensor", message, column=name, row=first + 1, count=count)
 
 
 def _unmoved(run: Run, starts: IndexArray, lengths: IndexArray) -> Iterator[Finding]:

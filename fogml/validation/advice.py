@@ -16,6 +16,7 @@ from fogml.validation.reasons import (
     Reason,
     gained_reasons,
     implausible_reasons,
+    reversed_reasons,
     saturated_reason,
     still_reason,
     unit_reasons,
@@ -151,6 +152,7 @@ def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
     yield from _one_way(judgement)
     yield from _one_temperature(judgement)
     for run in judgement.test:
+        yield from reversed_reasons(run)
         still = still_reason(run, asked.mostly_still, "judged")
         if still is None or still.grade != "do_not_use":
             yield from _of_run(run, asked)

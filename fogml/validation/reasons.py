@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from fogml.numerals import percent, short
 from fogml.runs.findings import IMPLAUSIBLE
 from fogml.validation.floors import floor_interval
@@ -93,6 +95,24 @@ def unit_reasons(
                     "Put the unit of the output right, and train and judge again.",
                 )
                 return
+
+
+def reversed_reasons(run: RunJudgement, *, steadier: float = 2.0) -> Iterator[Reason]:
+    """What speaks against a model where the drift comes with the other sign than it was trained on.
+
+    With the drift added a run that moves by more than its noise is steadier `steadier` times at least: three
+    quarters of what it moves by are then the drift's course, reversed.
+    """
+    moves, reversed_ = run.before.bias_stability, float(np.std(run.series.before + run.series.drift))
+    if moves > steadier * max(run.floor, reversed_):
+        yield Reason(
+            "do_not_use",
+            f"the output of {run.run} seems to be reversed",
+            f"Of {short(moves)} deg/h of bias stability on {run.run} the model makes "
+            f"{short(run.after.bias_stability)}; of the output with its sign changed it would leave "
+            f"{short(reversed_)}: was the axis turned over, or the sign changed on the way?",
+            "Put the sign of the output right, and judge it again.",
+        )
 
 
 def gained_reasons(run: RunJudgement) -> Iterator[Reason]:

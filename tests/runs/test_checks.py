@@ -302,8 +302,9 @@ class TestStuckSensors:
             columns["T_out"][part] = columns["T_out"][part.start]
         assert one(columns, "stuck_sensor").count == 14_000
 
-    def test_not_within_ten_minutes(self):
+    def test_not_within_ten_minutes_of_one_without_noise(self):
         columns = noisy()
+        columns["T_out"] = temperature(columns["time"] - 5.0)
         columns["T_out"][3000:8900] = columns["T_out"][3000]
         assert "stuck_sensor" not in codes(columns)
 
@@ -352,6 +353,27 @@ class TestStuckSensors:
             frozen = columns["T_in"].copy()
             frozen[start:stop] = frozen[start]
             assert one({**columns, "T_in": frozen}, "stuck_sensor").column == "T_in"
+
+    @pytest.mark.parametrize("start, stop", [(5000, 5070), (12_000, 20_000), (0, 15_000)])
+    def test_the_only_thermometer_that_freezes_though_it_was_noisy(self, start, stop):
+        columns = noisy()
+        del columns["T_out"]
+        columns["T_in"] = np.round(columns["T_in"], 3)
+        assert "stuck_sensor" not in codes(columns)
+        columns["T_in"][start:stop] = columns["T_in"][start]
+        finding = one(columns, "stuck_sensor")
+        assert (finding.column, finding.row, finding.count) == ("T_in", start + 1, stop - start)
+
+    @pytest.mark.parametrize("step", [1e-6, 0.01, 0.0625, 0.5])
+    def test_the_only_thermometer_that_comes_to_rest_is_not_stuck(self, step):
+        # 1 degC/min, an hour of rest, one sample in 30 s: each in the ramp differs, none in the rest.
+        time = 30.0 * np.arange(1000)
+        way = np.interp(time, [0, 4200, 8400, 12_600, 30_000], [-20, 50, 50, -20, -20])
+        settled = lag(time, way, 200.0)
+        for course in (way, settled):
+            columns = {"time": time, "gyro": np.random.default_rng(0).standard_normal(1000)}
+            columns["T"] = step * np.round(course / step)
+            assert "stuck_sensor" not in codes(columns)
 
     def test_a_sensor_dead_all_along(self):
         columns = noisy()

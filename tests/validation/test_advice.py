@@ -243,3 +243,19 @@ def test_a_run_in_another_unit_is_told_from_one_that_moves_more(times: float, to
     ]
     judged = judge(make_model("polynomial", "T").fit(runs[0]), *runs)
     assert ("different units" in advice_on(judged).brief) == told
+
+
+@pytest.mark.parametrize(
+    ("sign", "slope", "noise", "told"),
+    [(-1.0, 0.05, 0.05, True), (1.0, 0.05, 0.05, False), (1.0, 0.0, 0.05, False), (-1.0, 0.05, 8.0, False)],
+)
+def test_a_run_of_the_other_sign_is_told_where_its_drift_shows(
+    sign: float, slope: float, noise: float, told: bool
+) -> None:
+    rng, time = np.random.default_rng(1), 10.0 * np.arange(1500)
+    warm = 20.0 - 30.0 * np.cos(time / 2400.0)
+    trained = 5.0 + 0.05 * warm + rng.normal(0.0, 0.05, len(time))
+    judged = sign * (5.0 + slope * warm) + rng.normal(0.0, noise, len(time))
+    runs = [Run(name, {"time": time, "gyro": gyro, "T": warm}) for name, gyro in zip("ab", (trained, judged))]
+    advice = advice_on(judge(make_model("polynomial", "T").fit(runs[0]), *runs))
+    assert ("reversed" in advice.brief) == told
