@@ -65,6 +65,8 @@ class Mat:
         """Group, name, unit and array of each column, of the structs within a struct too."""
         own = held.get("units")
         units = own if isinstance(own, dict) else {}
+        # As a `timeseries` has them, made a struct.
+        units |= {"Data": held["Units"]} if isinstance(held.get("Units"), str) else {}
         held = apart(held)
         names = [name for name in held if name not in RESERVED]
         plain = [name for name in names if not isinstance(held[name], dict)]

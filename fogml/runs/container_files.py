@@ -270,7 +270,10 @@ def container_columns(
                 values = interpolated(at, own, values, source in held)
             columns[source] = values
             if len(values) != count:
-                raise InputError(f"{path.name}: {quoted(str(source))} holds {len(values)} values of {count}")
+                raise InputError(
+                    f"{path.name}: {quoted(str(source))} holds {len(values)} values of {count}; by a clock "
+                    "of its own 'join' brings it in, with the same file"
+                )
     return columns, tuple(findings)
 
 

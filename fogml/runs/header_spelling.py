@@ -97,7 +97,8 @@ def canonical_cells(cells: Sequence[str]) -> tuple[str, ...]:
     for name, unit in found:
         meant = _meant(name)
         alone = others[meant] == 1
-        sound = meant is not None and meant not in taken and alone and is_accepted(meant, unit)
+        is_free = meant not in taken and column_spec(name) is None
+        sound = meant is not None and is_free and alone and is_accepted(meant, unit)
         if sound and not (meant == "T" and (is_warm or unit is None)):
             assert meant is not None
             names.append((meant, unit))

@@ -8,37 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from fogml.errors import InputError, quoted
+from fogml.errors import quoted
 from fogml.escaping import visible
 from fogml.numerals import duration
-from fogml.readers.beside import tells_interval
-from fogml.runs.columns import column_spec, conversion, is_accepted, parse_header
-from fogml.runs.container_files import groups_of
-from fogml.runs.draft_layout import MOST_ROWS, Field, as_yaml, text_layout
+from fogml.runs.columns import column_spec, conversion, is_accepted
+from fogml.runs.draft_container import container_fields
+from fogml.runs.draft_layout import Field, as_yaml, text_layout
+from fogml.runs.draft_words import AXIS, COUNT, DATE, GYRO, MULTIPLE, NO_OUTPUT, OWN, SET_POINT, TIME, WARM
 from fogml.runs.header_spelling import MILLISECOND_NAMES, face_of
 from fogml.runs.opening import opened
 from fogml.runs.possible import digits_of_clock
-from fogml.runs.raw_table import vector_fault
-from fogml.runs.reader_process import stored_file
-from fogml.runs.reading_limits import DEFAULT_LIMITS
 from fogml.runs.stamp_forms import stamp_form
 from fogml.runs.stamps import PARTS, stamps_of_parts
 
-_TIME = re.compile(r"time|stamp|clock|zeit|epoch|tick|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
-_COUNT = re.compile(r"#|sample|index|count|packet|seq|row|scan|record|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
-_DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
-_GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
-_WARM = re.compile(r"temp|die|oven|therm|^t(\w{0,3}|[_.]\w*)$|温", re.IGNORECASE)
-_SET_POINT = re.compile(r"\bs[pv]\b|soll|set[ _-]?(point|value|temp)|target|consigne|设定", re.IGNORECASE)
-_OWN = re.compile(r"die|coil|gyr|fog|sensor|imu|spule|kreisel|^t(emp\w*)?$|陀螺|线圈|光纤", re.IGNORECASE)
-"""Of a thermometer's name that puts it in the gyro, or nowhere."""
-_NO_OUTPUT = re.compile(r"std|dev|sigma|rms|var|noise|err|min|max|cmd|command|table|turntable", re.IGNORECASE)
-"""Of a gyro's name that tells of something about its output, or of another's rate."""
-_MULTIPLE = re.compile(
-    r"[x*×·]\s?10+\b|/\s?10+\b|(?<![a-z\d.])(?:1?e-?\d|10\^-?\d|0\.0*1)(?!\d)", re.IGNORECASE
-)
-"""What a name or unit says of numbers that are multiplied: x100, 1e-3, 0.1."""
-_AXIS = re.compile(r"([xyz])\W*\Z", re.IGNORECASE)
 _UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
 _UNITS = {unit: conversion("time", unit, "")[0] for unit in ("s", "ms", "us", "ns")}
 _CENTURIES_S = 1e10  # three; what is counted from 1970 is 2e9
@@ -52,42 +34,20 @@ _MARK = "# GUESS: "
 def draft_profile(path: Path) -> str:
     """The text of an import profile (YAML) for a file: what is sure, and what is a guess and why."""
     file = opened(path)
-    is_text = file.kind == "csv"
-    layout, fields, interval = text_layout(file.path) if is_text else _of_container(path, file.kind)
+    tables: list[list[Field]] = []
+    if file.kind == "csv":
+        layout, fields, interval = text_layout(file.path)
+    else:
+        layout, fields, tables, interval = container_fields(path, file.kind)
     if file.within is not None:
         for one in fields:
             # Without its values another column would be taken for what it is.
             file.within.check_column(one.name, sum(bool(text.strip()) for text in one.first), len(one.first))
     lines = ["schema: fogml.import/1", f"description: {as_yaml('draft for ' + path.name)}"]
     lines += [*layout, *_columns(fields, interval)]
+    lines += _joined(path.suffix, tables, {line.split(":")[0].strip() for line in lines})
     # Names may hold marks that end a line of YAML.
     return "\n".join(map(visible, lines)) + "\n"
-
-
-def _of_container(path: Path, kind: str) -> tuple[list[str], list[Field], tuple[str, float] | None]:
-    """The fields of the group most like a gyro's and of others' temperatures, and what tells the interval."""
-    with stored_file(path, kind, (), DEFAULT_LIMITS) as stored:
-        groups = groups_of(stored, kind)
-        scores = {g.name: sum(bool(_GYRO.search(n)) for n in g.names) + 2 * g.is_run for g in groups}
-        if not scores:
-            raise InputError(f"{path.name}: holds no columns of numbers; a draft needs some")
-        main = max(scores, key=lambda name: scores[name])
-        timed = [g.name for g in groups if g.is_timed and parse_header(g.column("time")[0])[1]]
-        fields = []
-        for group in groups:
-            for cell, array in group.columns:
-                name, unit = parse_header(cell)
-                if tells_interval(array.name) and array.fault is None and np.prod(array.shape) == 1:
-                    continue
-                is_joined = {main, group.name} <= set(timed) and name != "time" and not group.is_run
-                if group.name == main or (is_joined and _WARM.search(name)):
-                    source = f"{array.group}/{array.name}" if array.group else array.name
-                    sound = vector_fault(array) is None
-                    held = stored.read(array, 0, min(max(array.shape), MOST_ROWS)) if sound else ()
-                    fields.append(Field(source, name, unit, [repr(float(value)) for value in held]))
-        interval = stored.told.get("interval")
-    others = [name for name in scores if name != main]
-    return ([f"# Other groups of the file: {', '.join(others[:20])}"] if others else []), fields, interval
 
 
 def _columns(fields: Sequence[Field], interval: tuple[str, float] | None) -> list[str]:
@@ -99,13 +59,13 @@ def _columns(fields: Sequence[Field], interval: tuple[str, float] | None) -> lis
     gyros = _taken(left, lambda f: f.name == "gyro" or f.name.startswith("gyro_"))
     gyros = gyros or [f for f in left if f.name == "gyro"]
     gyros = gyros or _taken(left, _is_called_a_gyro)
-    gyros.sort(key=lambda f: bool(_NO_OUTPUT.search(f.name)))
+    gyros.sort(key=lambda f: bool(NO_OUTPUT.search(f.name)))
     left = [f for f in left if f not in gyros]
     if not gyros:
         held = [f for f in left if np.isfinite(f.numbers).any() or not f.first]
         gyros = sorted(held, key=_unlike_a_gyro)[:1]
         left = [f for f in left if f not in gyros]
-    axes = {m[1].lower(): f for f in gyros if (m := _AXIS.search(f.name))}
+    axes = {m[1].lower(): f for f in gyros if (m := AXIS.search(f.name))}
     of_a_matrix = {m[1] for f in gyros if (m := re.fullmatch(r"(.*) column [123]", f.name))}
     in_order = "" if axes or len(gyros) != 3 or len(of_a_matrix) != 1 else f"    {_MARK}in this order?"
     axes = dict(zip("xyz", gyros, strict=True)) if in_order else axes
@@ -124,14 +84,16 @@ def _columns(fields: Sequence[Field], interval: tuple[str, float] | None) -> lis
                 f"by the clock of column {beside[-1].source}? then write it as a file of its own and join it"
             )
             lines[-1] = _doubted(lines[-1], doubt)
-    if len(lines) == warm_before and (rest := sorted((f for f in left if f not in gyros), key=_takes_few)):
+    if len(lines) == warm_before and (
+        rest := sorted((f for f in left if np.isfinite(f.numbers).any()), key=_takes_few)
+    ):
         lines.append(f"  # T: {{source: {as_yaml(rest[0].source)}, unit: degC}}    # a drift model needs one")
     if many:
         lines.append(
             "axes: {" + ", ".join(f"{axis}: {as_yaml(f.source)}" for axis, f in axes.items()) + "}" + in_order
         )
     if not any(line.startswith("  time:") for line in lines):
-        held = [f for f in left if f.first and (f.name == "time" or _TIME.search(f.name))]
+        held = [f for f in left if f.first and (f.name == "time" or TIME.search(f.name))]
         unread = f" ({quoted(held[0].first[0].strip())} is no date that is read)" if held else ""
         by = "write the true interval [s]" if interval is None else f"by {visible(interval[0])}"
         lines.append(
@@ -158,13 +120,31 @@ def _doubted(line: str, doubt: str) -> str:
 
 def _entry(line: str, one: Field) -> str:
     """The line of a field, a guess where the field's name says that its numbers are multiplied."""
-    found = _MULTIPLE.search(one.name)
+    found = MULTIPLE.search(one.name)
     return _doubted(line, f"its name says {found[0].strip()}: state a scale") if found else line
 
 
 def _is_called_a_gyro(one: Field) -> bool:
     """Whether a field's name is one of a gyro, and of nothing else that a run holds."""
-    return bool(_GYRO.search(one.name)) and not _DATE.search(one.name) and column_spec(one.name) is None
+    return bool(GYRO.search(one.name)) and not DATE.search(one.name) and column_spec(one.name) is None
+
+
+def _joined(suffix: str, tables: Sequence[Sequence[Field]], used: set[str]) -> list[str]:
+    """The keys that join thermometers of a container which have a clock of their own."""
+    lines = []
+    for table in tables:
+        named = [
+            f for f in table if f.name == "time" or (re.match("t_|time", f.name, re.IGNORECASE) and _grows(f))
+        ]
+        rest = [f for f in table if f not in named[:1] and _is_of_a_run(f) and f.name not in ("time", "gyro")]
+        if named and rest:
+            named[0].name = "time"
+            lines += [
+                f'  - file: "{{stem}}{suffix}"    # of this file, what has a clock of its own',
+                "    columns:",
+            ]
+            lines += [f"    {line}" for line in [*_clock(named[:1]), *(_other(f, None, used) for f in rest)]]
+    return ["join:", *lines] if lines else []
 
 
 def _is_left_of(one: Field, other: Field) -> bool:
@@ -175,8 +155,8 @@ def _is_left_of(one: Field, other: Field) -> bool:
 
 def _unlike_a_gyro(one: Field) -> tuple[bool, bool, bool, bool, int]:
     """What speaks against a field: a thermometer's name, a row's number, another unit, few values, text."""
-    is_warm, other = bool(_WARM.search(one.name)), one.unit is not None and not is_accepted("gyro", one.unit)
-    is_number = _grows(one) and bool(_COUNT.search(one.name))
+    is_warm, other = bool(WARM.search(one.name)), one.unit is not None and not is_accepted("gyro", one.unit)
+    is_number = _grows(one) and bool(COUNT.search(one.name))
     return is_warm, is_number, other, _takes_few(one), int(np.isnan(one.numbers).sum())
 
 
@@ -190,8 +170,8 @@ def _is_of_a_run(one: Field) -> bool:
     accepted = [
         name for name in ("T", "time", "gyro") if one.unit is not None and is_accepted(name, one.unit)
     ]
-    is_warm = "T" in accepted or (not accepted and bool(_WARM.search(one.name)))
-    return column_spec(one.name) is not None or (is_warm and not _SET_POINT.search(one.name))
+    is_warm = "T" in accepted or (not accepted and bool(WARM.search(one.name)))
+    return column_spec(one.name) is not None or (is_warm and not SET_POINT.search(one.name))
 
 
 def _clock(left: list[Field]) -> list[str]:
@@ -217,8 +197,8 @@ def _clock(left: list[Field]) -> list[str]:
         return [f"  time: {{source: {source}, unit: stamp}}{doubt}"]
     # Other columns of the run format, such as a T that grows, are no clocks.
     free = [f for f in left if f.name == "time" or column_spec(f.name) is None]
-    named = [f for f in free if f.name == "time" or _TIME.search(f.name) or _DATE.search(f.name)]
-    growers = [f for f in free if _grows(f) and not _COUNT.search(f.name) and not _is_of_a_run(f)]
+    named = [f for f in free if f.name == "time" or TIME.search(f.name) or DATE.search(f.name)]
+    growers = [f for f in free if _grows(f) and not COUNT.search(f.name) and not _is_of_a_run(f)]
     known = sorted(named, key=lambda f: f.name != "time") or growers[:1]
     growing = [f for f in known if _grows(f) or not f.first]
     growing = growing or [f for f in known if f.unit is not None and is_accepted("time", f.unit)]
@@ -235,7 +215,7 @@ def _clock(left: list[Field]) -> list[str]:
         return [_doubted(line, f"or by {', '.join(rest)}?") if rest else line]
     middle = np.median(one.numbers) if one.first else np.nan
     apart = np.median(np.diff(one.numbers)) if len(one.first) > 1 else np.nan
-    is_date = _DATE.search(f"{one.source} {one.name}") or apart < _LEAST_STEP
+    is_date = DATE.search(f"{one.source} {one.name}") or apart < _LEAST_STEP
     if is_date and any(low < middle < high for low, high in _DAYS):
         why = "days, as a spreadsheet counts them, or datenum"
         return [f"  time: {{source: {as_yaml(one.source)}, unit: d}}    {_MARK}{why}"]
@@ -305,7 +285,7 @@ def _other(one: Field, face: str | None, used: set[str]) -> str:
     named = [name for name in (one.name, face) if name is not None and column_spec(name) is not None]
     name = next(n for n in [*named, *others] if n not in used)
     guessed = "of the coil's face? else T_case or T_chamber" if name == face != one.name else None
-    if name not in named and (name != "T" or not _OWN.search(one.name)):
+    if name not in named and (name != "T" or not OWN.search(one.name)):
         where = "the gyro's own" if name == "T" else "a sensor of the coil"
         guessed = f"{where}? else T_case, T_chamber or another name"
     used.add(name)

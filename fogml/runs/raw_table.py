@@ -127,7 +127,10 @@ def choose_vectors(
         if fault is None:
             kept.append((cell, array))
         elif column_spec(name) is not None:
-            raise InputError(f"{file}, column '{name}': {fault}; one number per sample, export it again")
+            raise InputError(
+                f"{file}, column '{name}': {fault}; one number per sample, export it again, or read it by a "
+                "profile, as 'fogml import --draft' writes one"
+            )
         else:
             findings.append(Finding("left_out", f"{quoted(name)} is left out: it {fault}", column=name))
     return kept, tuple(findings)

@@ -13,6 +13,7 @@ from scipy.io import savemat
 
 from fogml.cli.main import app
 from fogml.errors import InputError
+from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.profile_draft import draft_profile
 from fogml.runs.profiles import import_recording, load_profile
 from fogml.runs.reading import read_run
@@ -529,3 +530,36 @@ def test_a_labview_file_without_x_columns_has_its_interval_and_separator_stated(
     assert "sample_s: 0.5    # GUESS: no clock was found; by Delta_X" in (tmp_path / "p.yaml").read_text()
     (run,) = import_recording(path, load_profile(tmp_path / "p.yaml"))
     np.testing.assert_allclose(run.gyro, GYRO)
+
+
+SLOW = np.arange(0.0, 10.0 * COUNT, 100.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "arrays"),
+    [
+        ("a.npz", {"t": TIME, "gyro": TIME % 37 + 0.5, "t_T": SLOW, "T": 25 + SLOW / 100}),
+        ("a.mat", {"t": TIME, "gyro": TIME % 37 + 0.5, "t_temp": SLOW, "temp": 25 + SLOW / 100}),
+        (
+            "b.mat",  # as timeseries made structs
+            {
+                "gyro": {"Time": TIME, "Data": TIME % 37 + 0.5, "Units": "deg/s"},
+                "die": {"Time": SLOW, "Data": 25 + SLOW / 100, "Units": "degC"},
+            },
+        ),
+    ],
+)
+def test_a_thermometer_with_a_clock_of_its_own_in_the_file_is_joined(tmp_path, name, arrays):
+    (np.savez if name.endswith("npz") else savemat)(tmp_path / name, **(
+        arrays if name.endswith("npz") else {"mdict": arrays}
+    ))  # fmt: skip
+    (tmp_path / "p.yaml").write_text(draft_profile(tmp_path / name))
+    (run,) = import_recording(tmp_path / name, load_profile(tmp_path / "p.yaml"))
+    np.testing.assert_allclose(run.gyro, 3600.0 * (TIME % 37 + 0.5))
+    known = SLOW[-1] >= TIME
+    np.testing.assert_allclose(run.columns["T"][known], 25 + TIME[known] / 100)
+
+
+def test_a_thermometer_beside_a_clock_called_t_is_no_clock():
+    assert canonical_cells(["t", "gyro", "T"]) == ("time", "gyro", "T")
+    assert canonical_cells(["t", "T [degC]"]) == ("time", "T [degC]")
