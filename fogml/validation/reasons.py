@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -70,31 +71,41 @@ def implausible_reasons(run: RunJudgement) -> Iterator[Reason]:
             )
 
 
+_FACTORS = {
+    58.0: "deg/min, 60 times deg/h, or in radians, 57",
+    1000.0: "thousandths",
+    3600.0: "deg/s, 3600 times deg/h",
+    206265.0: "rad/s, 206265 times deg/h",
+}
+
+
 def unit_reasons(
-    train: Sequence[RunJudgement], test: Sequence[RunJudgement], *, units_apart: float = 1000.0
+    train: Sequence[RunJudgement], test: Sequence[RunJudgement], *, units_apart: float = 40.0
 ) -> Iterator[Reason]:
-    """What speaks against a model where a run seems to be in another unit than those trained on.
+    """What speaks against a model where two runs seem to be in different units.
 
     What two runs of one gyro move by, and their noise, both differ by less than `units_apart` times unless
-    one is in deg/s: that is 3600 times deg/h.
+    one is in another unit: radians, the nearest to degrees, are 57 of them.
     """
-    for run in test:
-        for other in train:
-            moves = run.before.bias_stability, other.before.bias_stability
-            noises = run.floor, other.floor
-            if min(*moves, *noises) <= 0.0:
-                continue
-            apart = [a / b for a, b in (moves, noises)]
-            if min(apart) > units_apart or max(apart) < 1.0 / units_apart:
-                yield Reason(
-                    "do_not_use",
-                    f"{run.run} and {other.run} seem to be in different units",
-                    f"{run.run} moves by {short(moves[0])} deg/h and {other.run} by {short(moves[1])}, and "
-                    f"their noise is as far apart ({short(noises[0], 2)} and {short(noises[1], 2)}): is one "
-                    "of them in deg/s, 3600 times deg/h?",
-                    "Put the unit of the output right, and train and judge again.",
-                )
-                return
+    for other, run in combinations((*train, *test), 2):
+        moves = run.before.bias_stability, other.before.bias_stability
+        noises = run.floor, other.floor
+        if min(*moves, *noises) <= 0.0:
+            continue
+        apart = [abs(math.log(a / b)) for a, b in (moves, noises)]
+        same_way = (moves[0] > moves[1]) == (noises[0] > noises[1])
+        if same_way and min(apart) > math.log(units_apart):
+            factor = min(_FACTORS, key=lambda one: abs(apart[1] - math.log(one)))
+            near = abs(apart[1] - math.log(factor)) < math.log(2.0)
+            yield Reason(
+                "do_not_use",
+                f"{run.run} and {other.run} seem to be in different units",
+                f"{run.run} moves by {short(moves[0])} deg/h and {other.run} by {short(moves[1])}, and "
+                f"their noise is as far apart ({short(noises[0], 2)} and {short(noises[1], 2)}): is one of "
+                f"them in {_FACTORS[factor] if near else 'another unit'}?",
+                "Put the unit of the output right, and train and judge again.",
+            )
+            return
 
 
 def reversed_reasons(run: RunJudgement, *, steadier: float = 2.0) -> Iterator[Reason]:

@@ -232,8 +232,20 @@ def test_report_and_words_say_the_same() -> None:
     assert values["test"][0]["coverage"] == judged.test[0].coverage
 
 
-@pytest.mark.parametrize(("times", "told"), [(3600.0, True), (1.0 / 3600.0, True), (20.0, False)])
-def test_a_run_in_another_unit_is_told_from_one_that_moves_more(times: float, told: bool) -> None:
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [
+        (3600.0, "in deg/s, 3600 times"),
+        (1.0 / 3600.0, "in deg/s, 3600 times"),
+        (1000.0, "in thousandths?"),
+        (180.0 / np.pi, "in deg/min, 60 times deg/h, or in radians"),
+        (1.0 / 60.0, "in deg/min, 60 times deg/h, or in radians"),
+        (648_000.0 / np.pi, "in rad/s"),
+        (1e8, "in another unit?"),
+        (20.0, ""),
+    ],
+)
+def test_a_run_in_another_unit_is_told_from_one_that_moves_more(times: float, told: str) -> None:
     time = 10.0 * np.arange(1500)
     warm = 20.0 - 30.0 * np.cos(time / 2400.0)
     drift = 5.0 + 0.05 * warm + np.random.default_rng(1).normal(0.0, 0.05, (2, len(time)))
@@ -242,7 +254,11 @@ def test_a_run_in_another_unit_is_told_from_one_that_moves_more(times: float, to
         for name, scale, gyro in zip("ab", (1.0, times), drift, strict=True)
     ]
     judged = judge(make_model("polynomial", "T").fit(runs[0]), *runs)
-    assert ("different units" in advice_on(judged).brief) == told
+    advice = advice_on(judged)
+    assert ("different units" in advice.brief) == bool(told)
+    assert told in advice.reasons[0]
+    both = judge(make_model("polynomial", "T").fit(runs), runs, [runs[0]])
+    assert ("different units" in advice_on(both).brief) == bool(told)
 
 
 @pytest.mark.parametrize(
