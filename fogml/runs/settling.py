@@ -10,6 +10,8 @@ from fogml.arrays import FloatArray, IndexArray
 
 LEAST_ROWS = 4
 """Rows that tell a mean and a line."""
+SHARE = 1e-8
+"""Of a step, what may lack and count as settled: a hundredth of a ppm of scale factor, and no rounding."""
 
 
 def settling_rows(
@@ -21,7 +23,7 @@ def settling_rows(
     *,
     growth: float = 1.5,
     errors: float = 4.0,
-    share: float = 1e-8,
+    share: float = SHARE,
 ) -> int:
     """Rows after a step in which the output lacks some of it, `first` at least, half of a plateau at most.
 
@@ -43,7 +45,7 @@ def settling_rows(
     errors
         Standard errors beyond which the output has not settled; of tens of windows noise takes none so far.
     share
-        Of a step, what may lack all the same: a hundredth of a ppm of the scale factor, and no rounding.
+        Of a step, what may lack all the same.
     """
     plateaus = [
         _settled(output, start, stop, height)
@@ -76,6 +78,7 @@ def unsettled_rows(
     heights: FloatArray,
     first: tuple[int, int],
     reach: tuple[int, int],
+    share: tuple[float, float] = (SHARE, SHARE),
 ) -> tuple[int, int]:
     """Rows at the begin of plateaus in which gyro and table have not settled, and at the end in which they
     have left, as where the recorded rate comes late; by all plateaus together.
@@ -94,6 +97,8 @@ def unsettled_rows(
         Rows that the searches begin with, at begins and at ends.
     reach
         Rows of a plateau that are looked at, at most, from either end.
+    share
+        Of a step, what may lack at begins and at ends.
     """
     begin, end, count = edges[:-1], edges[1:], len(output)
     lasting = end - begin >= LEAST_ROWS
@@ -101,10 +106,14 @@ def unsettled_rows(
     settling, leaving = 0, 0
     for _ in range(2):
         kept = np.minimum(np.append(end[:-1] - leaving, end[-1])[1:], begin[1:] + reach[0])
-        settling = settling_rows(output, begin[1:][begins], kept[begins], heights[begins], first[0])
+        settling = settling_rows(
+            output, begin[1:][begins], kept[begins], heights[begins], first[0], share=share[0]
+        )
         ended = count - end[:-1]
         kept = np.minimum(count - np.append(0, begin[1:] + settling)[:-1], ended + reach[1])
-        leaving = settling_rows(output[::-1], ended[ends], kept[ends], -heights[ends], first[1])
+        leaving = settling_rows(
+            output[::-1], ended[ends], kept[ends], -heights[ends], first[1], share=share[1]
+        )
     return settling, leaving
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.runs.settling import LEAST_ROWS, unsettled_rows
+from fogml.runs.settling import LEAST_ROWS, SHARE, unsettled_rows
 from fogml.runs.turning import least_rate_deg_s, white_noise
 from fogml.signals import large
 
@@ -19,6 +19,9 @@ LEAST_GYRO_STEP_DEG_S = 0.1
 """Steps of the gyro smaller than this are not taken for turns of a table [deg/s]."""
 LONGEST_TRANSITION_S = 60.0
 """A rate that changes for longer is a profile of its own, not a transition [s]."""
+_LATE_SHARE = 1e-3
+"""Share of a step that another rate has made of a few rows, at least, where the recorded one is late: less is
+the wander of a bias, as only a change within a two hundredth of a row makes as little of a lateness."""
 _LAG_S = 1.0
 _PLATEAU_S = 3.0
 _RATE_NOISES, _GYRO_NOISES = 8.0, 20.0
@@ -225,7 +228,7 @@ def _unsettled_s(
     """Time after changes in which all of them together show that gyro or table have not settled, and time
     before them in which they show that these have left, as where the recorded rate comes late [s].
 
-    `least_s` or longer, half of the shortest plateau at most that tells it.
+    `least_s` or longer; not settled, half of the shortest plateau at most that tells it.
     """
     if len(changes.start) == 0:
         return least_s, least_s
@@ -235,13 +238,13 @@ def _unsettled_s(
     reach = max(round(LONGEST_TRANSITION_S / run.sample_s), LEAST_ROWS)
     levels = _middles(run.gyro, edges, reach)
     heights = np.where(np.isin(ends, changes.start), levels[1:, 0] - levels[:-1, 1], 0.0)
-    rows = unsettled_rows(run.gyro, edges, heights, (first, first), (reach, reach))
-    lasting = np.minimum(np.diff(edges), reach)
-    longest = 0.5 * float(min(lasting[lasting >= 4 * first], default=0)) * run.sample_s
-    settled_s, left_s = (
-        least_s if n <= first else max(least_s, min(n * run.sample_s, longest)) for n in rows
-    )
-    return settled_s, left_s
+    share = (SHARE, _LATE_SHARE)
+    settled, left = unsettled_rows(run.gyro, edges, heights, (first, first), (reach, reach), share)
+    plateaus = np.minimum(np.diff(changes.start, append=len(run)), reach)
+    longest = 0.5 * float(min(plateaus[plateaus >= 4 * first], default=0)) * run.sample_s
+    settled_s = least_s if settled <= first else max(least_s, min(settled * run.sample_s, longest))
+    # What another rate has made is told by no part of a plateau, however short: it may be lost altogether.
+    return settled_s, max(least_s, left * run.sample_s)
 
 
 def _middles(series: FloatArray, edges: IndexArray, reach: int) -> FloatArray:
