@@ -65,13 +65,13 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
     layout += [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
     layout += ["checksum: true"] if has_sums else []
     if encoding not in ("utf-8-sig", "utf-8"):
-        doubt = (
-            ""
-            if encoding.startswith("utf")
-            else "    # GUESS: are the names right? else cp1251, koi8-r, shift_jis, big5 ..."
-        )
-        layout.append(f"encoding: {encoding}{doubt}")
+        doubt = "    # GUESS: are the names right? else cp1251, koi8-r, shift_jis, big5 ..."
+        layout.append(f"encoding: {encoding}{'' if encoding.startswith('utf') else doubt}")
     header = _Header.above(lines, data, width, mark)
+    if header is None:
+        # Facts have names; without any, every line of as many numbers is one of the data.
+        begin = next(i for i, line in enumerate(lines) if _is_data(_split(line, mark), width, numeric))
+        data, is_broken = begin, is_broken or begin < data
     if header is None or header.is_by_place:
         # A name would be of none of its columns, or of several.
         cells = [f"column {i}" for i in range(width)] if header is None else header.known
@@ -153,6 +153,8 @@ class _Header:
 
 def _are_names(cells: Sequence[str]) -> bool:
     """Whether the cells of a line are names, numbers beside those of a time and a gyro apart."""
+    if not "".join(cells).replace("\t", "").isprintable():
+        return False
     if not any(is_number_like(cell.strip(' "')) for cell in cells):
         return True
     return Header(0, 1, "", canonical_cells([cell.strip(' "') for cell in cells])).is_sure

@@ -233,11 +233,9 @@ def _clock(left: list[Field]) -> list[str]:
 
 def _is_in_digits(one: Field) -> bool:
     """Whether a field holds times such as 095959: no number has a zero before it, and minutes end."""
-    texts = [text.strip(' "') for text in one.first]
-    is_padded = any(re.match(r"0\d{5}(\D|\Z)", text) for text in texts)
-    form = stamp_form(texts, digits=True)
-    is_time = form is not None and form.kind == "time in digits" and all(map(form.matches, texts))
-    return is_time and (is_padded or (_grows(one) and digits_of_clock(one.numbers)))
+    found = [re.match(r"(\d{1,2})([0-5]\d)([0-5]\d)(?:\D|\Z)", text.strip(' "')) for text in one.first]
+    is_padded = any(m is not None and len(m[1]) == 2 and m[1].startswith("0") for m in found)
+    return all(found) and (is_padded or (_grows(one) and digits_of_clock(one.numbers)))
 
 
 def _parts_of_a_clock(fields: Sequence[Field]) -> Sequence[Field]:

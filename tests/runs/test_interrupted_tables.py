@@ -85,7 +85,7 @@ def test_the_same_header_again_is_a_line_to_leave_out(tmp_path):
     np.testing.assert_array_equal(read_run(units_apart, repair=True).time, TIME)
 
 
-@pytest.mark.parametrize("place", [0, 300, 2000])
+@pytest.mark.parametrize("place", [0, 40, 300, 2000])
 def test_noise_of_a_line_costs_the_rows_it_hits_and_no_others(tmp_path, place):
     content = ("\n".join([*ROWS, ""])).encode()
     path = tmp_path / "a.txt"

@@ -162,8 +162,9 @@ def test_a_draft_takes_times_in_digits_for_stamps_and_plain_numbers_for_none(tmp
         tmp_path / "a.csv", (at.strftime("%H%M%S.00") for at in moments(datetime(2026, 3, 11, 8))), "utc,w,T"
     )
     assert "time: {source: utc, unit: stamp}    # GUESS" in draft_profile(digits)
-    plain = log(tmp_path / "b.csv", (f"{100000 + i}" for i in range(COUNT)), "time,w,T")
-    assert "time: {source: time, unit: s}" in draft_profile(plain)
+    for first in ("100000", "000000"):
+        plain = log(tmp_path / "b.csv", (f"{int(first) + i:06d}" for i in range(COUNT)), "time,w,T")
+        assert "time: {source: time, unit: s}" in draft_profile(plain)
     wrong = log(tmp_path / "c.csv", [*(f"0801{i:02d}" for i in range(60)), "086100"], "utc,w,T")
     (tmp_path / "p.yaml").write_text(PROFILE.format("utc"))
     with pytest.raises(InputError, match=r"line 62, column 'utc': '086100' is no date and time"):
