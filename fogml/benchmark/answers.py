@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +12,12 @@ from fogml.arrays import FloatArray
 from fogml.benchmark.rounds import ANSWER, Track, TrackFolder, read_round
 from fogml.blind.folders import OUTCOME, CaseFiles, read_json
 from fogml.blind.run import RunPlan
+from fogml.blind.worker import own_roots, within
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
+from fogml.models.regressors import own_regressor, own_regressors
 from fogml.runs.reading import read_run
 from fogml.validation.run_errors import run_errors
 
@@ -145,6 +148,16 @@ def _check_row(line: str, cells: tuple[str, ...], path: Path, row: int) -> None:
             )
 
 
+def _folder_of(name: str) -> Path | None:
+    """Where the package lies that declares a regressor, if a sealed process can't read it by itself."""
+    if name not in own_regressors():
+        return None
+    top = sys.modules[own_regressor(name).__module__.partition(".")[0]]
+    if top.__file__ is None or within(top.__file__, own_roots()):
+        return None
+    return Path(top.__file__).parents[1 if hasattr(top, "__path__") else 0]
+
+
 _DRIFT_MODEL = "fogml.benchmark.answers:drift_model"
 
 
@@ -192,6 +205,7 @@ def entry_plan(
         from fogml.models.names import make_model
 
         make_model(method, features)  # a name that is not known is told before any process begins
+        code = code or _folder_of(method)
     folder = TrackFolder(Path(directory), track)
     called = entry_name(method, name)
     return RunPlan(

@@ -24,6 +24,7 @@ from fogml.gap.scene import Scene
 from fogml.gap.settings import STANDARD, Priors
 from fogml.numerals import short
 from fogml.twin.effect import Effect
+from fogml.twin.inputs import REST, STAND_INS
 
 Form = Mapping[str, Any]
 
@@ -131,7 +132,11 @@ def features_of(declared: Effect, forms: Sequence[Form], recorded: Recorded) -> 
         return (), "it goes with the unit's own days, which no feature knows: calibrate again"
     texts = (text for form in forms for text in _span(declared, form, recorded))
     features = tuple(dict.fromkeys(texts))
-    return features, "" if features else "the runs do not record what drives it"
+    driving = set(declared.needs) - {"earth", "facts", "output", "slopes", "powered_on"}
+    stated = declared.family != "signature" or declared.compensated_by
+    unknown = not stated and driving <= recorded.columns | {"T"}
+    reason = "no features that hold it are stated" if unknown else "the runs do not record what drives it"
+    return features, "" if features else reason
 
 
 def _span(declared: Effect, form: Form, recorded: Recorded) -> list[str]:
@@ -201,6 +206,11 @@ def _span(declared: Effect, form: Form, recorded: Recorded) -> list[str]:
             places = recorded.of("T_case", "T_chamber", "T_electronics")
             places.append(f"lag({x}, {grids.placement_lag_s:g} s)")
             return [text for place in places for text in (place, f"({x})*{place}")]
+        case _ if declared.compensated_by:
+            shape = {**declared.default_shape(), **form}
+            texts = [text.format(**shape) for text in declared.compensated_by]
+            there = recorded.columns | {"T"}
+            return texts if {*STAND_INS, *REST} & set(_words(", ".join(texts))) <= there else []
         case _:
             # What it states to need, where runs record that.
             needs = set(declared.needs)
@@ -208,4 +218,8 @@ def _span(declared: Effect, form: Form, recorded: Recorded) -> list[str]:
             if "angle" in needs:
                 texts += ["sine(angle, 360 deg)", "cosine(angle, 360 deg)"]
             texts += [name for name in ("B_x", "B_y", "B_z") if name in needs]
-            return [text for text in texts if set(re.findall(r"[A-Za-z_]+", text)) & recorded.columns]
+            return [text for text in texts if set(_words(text)) & recorded.columns]
+
+
+def _words(text: str) -> list[str]:
+    return re.findall(r"[A-Za-z_]\w*", text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -33,10 +34,12 @@ from fogml.gap.result_parts import Nearest, WhatIf
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.where import GapOnRun, where
 from fogml.processes import one_thread
+from fogml.runs.exchange import runs_of
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.twin.registry import effects
 from fogml.twin.twin import Twin
+from fogml.twin.twin_file import as_twin
 
 
 def with_epoch(*groups: Sequence[Run]) -> tuple[list[Run], ...]:
@@ -69,9 +72,9 @@ __all__ = ["diagnose"]
 
 
 def diagnose(
-    model: Twin | AnyModel,
-    fit: Sequence[Run],
-    held_out: Sequence[Run] = (),
+    model: Twin | AnyModel | str | Path,
+    fit: Run | Sequence[Run],
+    held_out: Run | Sequence[Run] = (),
     *,
     noise: Run | None = None,
     without: Iterable[str] = (),
@@ -88,9 +91,9 @@ def diagnose(
     Parameters
     ----------
     model
-        The twin, or any model of a gyro in its place.
+        The twin, the name or file of one, or any model of a gyro in its place.
     fit
-        Runs of one unit to fit on.
+        A run or runs of one unit to fit on.
     held_out
         Runs for the final figure; if none, the last quarter of the last fit run.
     noise
@@ -119,6 +122,8 @@ def diagnose(
         unknown, or no run can be used.
     """
     tell = progress or (lambda what: None)
+    fit, held_out = runs_of(fit), runs_of(held_out)
+    model = as_twin(model) if isinstance(model, str | Path) else model
     found = inferred(model, fit, held_out, noise, without, priors, tell)
     tell("judging on held-out runs")
     return answered(found, noise, not held_out, seed, cost_of_false_name, plan, rehearsed, courses, tell)

@@ -20,6 +20,7 @@ from fogml.models.card import TrainingCard, check_unit_and_axis
 from fogml.models.compact import Compact
 from fogml.models.intervals import Intervals
 from fogml.models.scikit_learn import BaseEstimator, NotFittedError
+from fogml.runs.exchange import one_run
 from fogml.runs.plausible import refuse_twice
 from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
@@ -155,8 +156,7 @@ class DriftModel(BaseEstimator, ABC):
             If the run lacks what the features need, or the drift is not finite at some sample.
         """
         self._check_fitted()
-        if not isinstance(run, Run):
-            raise InputError(f"one run is needed, found {type(run).__name__}; call it for each run")
+        run = one_run(run)
         if self.features_ is None:
             everywhere = np.ones(len(run), dtype=np.bool_)
             return self.evaluate_from(run, AtomValues(np.empty((len(run), 0)), everywhere, everywhere))
@@ -303,7 +303,7 @@ class DriftModel(BaseEstimator, ABC):
             If the run is of another unit or axis than the training runs and `any_unit` is not set.
         """
         self._check_fitted()
-        return check_unit_and_axis(self.card_, run, any_unit)
+        return check_unit_and_axis(self.card_, one_run(run), any_unit)
 
     def describe(self) -> dict[str, Any]:
         """What reports say of the model: kind, features, parameters, bytes, training, intervals."""

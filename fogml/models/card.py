@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from operator import attrgetter
-from pathlib import Path
 from typing import Annotated, Any, Literal
 from zlib import crc32
 
@@ -18,6 +17,7 @@ from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.slices import SavedSlices
 from fogml.models.box import slices_of
+from fogml.runs.exchange import runs_of
 from fogml.runs.run import Run
 from fogml.runs.thermometers import SavedLimits, saved_limits, trained_limits
 from fogml.signals import large
@@ -133,26 +133,6 @@ def hash_ahead(runs: Sequence[Run]) -> Callable[[], list[str]]:
     pending = [pool.submit(attrgetter("hash"), run) for run in runs]
     pool.shutdown(wait=False)
     return lambda: [hash_of.result() for hash_of in pending]
-
-
-def runs_of(given: Run | Sequence[Run]) -> tuple[Run, ...]:
-    """One run or several as a tuple.
-
-    Raises
-    ------
-    InputError
-        If something is no run, as a table or the name of a file.
-    """
-    found: Any = given
-    one = isinstance(found, str | Path) or hasattr(found, "columns") or not isinstance(found, Iterable)
-    group: tuple[Any, ...] = (found,) if one else tuple(found)
-    for run in group:
-        if not isinstance(run, Run):
-            raise InputError(
-                f"runs are needed, found {type(run).__name__}; fogml.read_run makes one of a file, "
-                "fogml.Run.from_pandas of a table"
-            )
-    return group
 
 
 def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:

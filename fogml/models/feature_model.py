@@ -280,7 +280,7 @@ class FeatureModel(DriftModel):
 
 def check_feature_text(text: str) -> None:
     """Hold that text of features is understood, ``{sensor}`` standing for any sensor."""
-    parse_features(text.replace(_EACH_SENSOR, "T1"))
+    parse_features(text.replace(_EACH_SENSOR, "T1") if isinstance(text, str) else text)
 
 
 def resolve_features(features: str | Features, runs: Sequence[Run]) -> Features:

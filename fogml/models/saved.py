@@ -83,6 +83,25 @@ class _Document(Strict):
     sha256: str
 
 
+def as_model(found: Any) -> DriftModel:
+    """What has to be a drift model.
+
+    Raises
+    ------
+    InputError
+        If it is another thing, as a bare regressor.
+    """
+    from fogml.models.base import DriftModel
+
+    if not isinstance(found, DriftModel):
+        kind = type(found).__name__
+        raise InputError(
+            f"a drift model is needed, found {kind}; fogml.make_model makes one, of a bare regressor "
+            f"fogml.models.feature_model.FeatureModel('T, dT', {kind}())"
+        )
+    return found
+
+
 def save_model(model: DriftModel, folder: str | Path) -> None:
     """Write a fitted model into a folder; existing model files there are replaced.
 
@@ -92,7 +111,7 @@ def save_model(model: DriftModel, folder: str | Path) -> None:
         If the folder can't be written, the model is of no known kind, or holds what can't be saved
         without pickle.
     """
-    document, weights = _saved_document(model)
+    document, weights = _saved_document(as_model(model))
     model_of_form(document["form"], document["kind"])
     text = json_text(document, MODEL_FILE, indent=1)
     with whole_folder(folder) as staging:

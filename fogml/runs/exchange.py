@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -18,6 +19,8 @@ from fogml.runs.possible import as_vector
 if TYPE_CHECKING:
     import pandas as pd
 
+    from fogml.runs.run import Run
+
 
 class Exchange(Pictured):
     """What a `Run` has besides its columns and facts for the tools around it."""
@@ -31,6 +34,14 @@ class Exchange(Pictured):
     def hash(self) -> str:
         """Tells what columns hold."""
         raise NotImplementedError
+
+    def _check_set_up(self) -> None:
+        """Hold that facts and the output's unit are such."""
+        if self.gyro_unit not in ("deg/h", "count"):
+            raise InputError(f"{self.name}: gyro_unit is '{self.gyro_unit}'; it may be deg/h or count")
+        if not isinstance(self.facts, Facts):
+            kind = type(self.facts).__name__
+            raise InputError(f"{self.name}: facts are {kind}; fogml.Facts(unit=..., axis=...) was expected")
 
     @classmethod
     def from_pandas(cls, frame: pd.DataFrame, name: str = "run", facts: Facts | None = None) -> Self:
@@ -163,3 +174,36 @@ def _times_of_index(index: pd.Index[Any], name: str) -> tuple[str, str | None, A
             "seconds as a column 'time', or call the index 'time [s]'"
         )
     return column, unit, index
+
+
+def runs_of(given: Run | Sequence[Run]) -> tuple[Run, ...]:
+    """One run or several as a tuple.
+
+    Raises
+    ------
+    InputError
+        If something is no run, as a table or the name of a file.
+    """
+    found: Any = given
+    one = isinstance(found, str | Path) or hasattr(found, "columns") or not isinstance(found, Iterable)
+    group: tuple[Any, ...] = (found,) if one else tuple(found)
+    for run in group:
+        if not isinstance(run, Exchange):
+            raise InputError(
+                f"runs are needed, found {type(run).__name__}; fogml.read_run makes one of a file, "
+                "fogml.Run.from_pandas of a table"
+            )
+    return group
+
+
+def one_run(found: Any) -> Run:
+    """What has to be a run.
+
+    Raises
+    ------
+    InputError
+        If it is several, or none.
+    """
+    if isinstance(found, list | tuple):
+        raise InputError(f"one run is needed, found {type(found).__name__}; call it for each run")
+    return runs_of(found)[0]

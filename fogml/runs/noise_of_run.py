@@ -13,6 +13,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
 from fogml.numerals import percent, short
+from fogml.runs.exchange import runs_of
 from fogml.runs.findings import beside_drift
 from fogml.runs.noise_series import (
     LOST,
@@ -76,7 +77,7 @@ def noise_report(
     InputError
         If the output is in counts without a scale factor, a run is too short, or sample intervals differ.
     """
-    runs = [run] if isinstance(run, Run) else list(run)
+    runs = runs_of(run)
     if not runs:
         raise InputError("no run is given; name one")
     series = [series_of(one) for one in runs]

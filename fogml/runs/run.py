@@ -66,8 +66,7 @@ class Run(Exchange):
             Naming the run, the column and the first sample at fault: no vector of numbers, of another
             length, missing or infinite, time that goes back or repeats, or is in too coarse a precision.
         """
-        if self.gyro_unit not in ("deg/h", "count"):
-            raise InputError(f"{self.name}: gyro_unit is '{self.gyro_unit}'; it may be deg/h or count")
+        self._check_set_up()
         columns = {name: as_vector(self.name, name, values).copy() for name, values in self.columns.items()}
         check_columns(self.name, columns)
         self._freeze(columns)

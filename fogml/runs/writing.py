@@ -17,6 +17,7 @@ from fogml.errors import InputError
 from fogml.json_files import FAR_OFF
 from fogml.outputs import whole_file, whole_files
 from fogml.runs.columns import column_spec, header
+from fogml.runs.exchange import one_run
 from fogml.runs.facts import SIDE_SUFFIXES, Facts, side_file, side_file_text, stated_facts
 from fogml.runs.raw_table import FACTS_KEY
 from fogml.runs.run import Run
@@ -44,7 +45,7 @@ def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | 
         If the suffix is not known, the place can't be written, or a side file of that stem
         states other facts, or a value of a known column is not finite.
     """
-    path = Path(path)
+    path, run = Path(path), one_run(run)
     suffix = checked_suffix(path)
     cells = header_cells(run)
     if suffix in (".csv", ".parquet"):

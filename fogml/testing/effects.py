@@ -12,6 +12,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.features.parse import parse_features
 from fogml.gap.catalogue import FAMILIES
 from fogml.numerals import percent
 from fogml.testing.effect_inputs import (
@@ -61,6 +62,8 @@ def check_declaration(effect: Effect) -> None:
         assert other in there, f"{name}: confused_with or conflicts name '{other}', which is no effect"
     families = ("signature", *FAMILIES)
     assert effect.family in families, f"{name}: family '{effect.family}' is none of {', '.join(families)}"
+    for text in effect.compensated_by:
+        parse_features(text.format(**effect.default_shape()))
     known = {*STAND_INS, *REST, *SET_UP}
     assert set(effect.needs) <= known, f"{name} needs {sorted(set(effect.needs) - known)}, which no input has"
     assert len(set(effect.needs)) == len(effect.needs), f"{name}: needs repeat"

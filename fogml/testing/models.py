@@ -18,7 +18,7 @@ from fogml.models.compact import network_of
 from fogml.models.compensation import compensate_blocks
 from fogml.models.feature_model import FeatureModel
 from fogml.models.regressors import goes_on_linearly, predict_rows
-from fogml.models.saved import load_model, model_to_saved, save_model
+from fogml.models.saved import as_model, load_model, model_to_saved, save_model
 from fogml.models.scikit_learn import clone
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import Run
@@ -64,6 +64,7 @@ def check_model(
         What fogml tells of a regressor that raises, writes to the table that it is given, or answers with
         another thing than a number a row.
     """
+    model = as_model(model)
     train = [synthetic_run("train", 1.0, turns)] if train is None else list(train)
     other = synthetic_run("other", 2.0, turns, seed=1) if other is None else other
     fitted = _check_refit(model, train)

@@ -71,6 +71,9 @@ class Effect(ABC):
         Where it sits: what temperature drives it, and where to look for it.
     digitises
         Whether it acts on the number that is read, behind a sensor's lag and noise.
+    compensated_by
+        Of family ``signature``: features of a drift model that hold it, as text with names of its shape in
+        braces, ``lag(T, {time_constant:g} s)``; `fogml train --from-diagnosis` fits them.
     seeded
         Whether a simulation draws what differs each time itself, from its seed: then repeats leave the
         amplitude alone, and a replay, which can't know the draw, has what is expected of it.
@@ -95,6 +98,7 @@ class Effect(ABC):
     seeded: ClassVar[bool] = False
     family: ClassVar[str] = "signature"
     place: ClassVar[str] = ""
+    compensated_by: ClassVar[tuple[str, ...]] = ()
     digitises: ClassVar[bool] = False
 
     def __init_subclass__(cls, **more: Any) -> None:

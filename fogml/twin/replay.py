@@ -6,12 +6,14 @@ from collections import OrderedDict
 from collections.abc import Hashable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
+from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.columns import coil_sensor_number
+from fogml.runs.exchange import one_run
 from fogml.runs.facts import Direction, Facts, Heading
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.steps import noisy_beyond
@@ -24,6 +26,7 @@ from fogml.twin.plant.heat import PowerWindows, windows_since
 from fogml.twin.recorder import logged
 from fogml.twin.truth import Truth
 from fogml.twin.twin import RATE_WINDOW_S, EffectSetting, Twin
+from fogml.twin.twin_file import as_twin
 
 _CACHE_BYTES = 256_000_000
 _LONGEST_ON_S = 1e8
@@ -32,13 +35,15 @@ QUIET_DEGC = 2.5e-4
 """Readings with less noise give their rates from neighbour to neighbour, as true nodes do."""
 
 
-def replay(twin: Twin, run: Run, *, only: str | None = None, truth: Truth | None = None) -> FloatArray:
+def replay(
+    twin: Twin | str | Path, run: Run, *, only: str | None = None, truth: Truth | None = None
+) -> FloatArray:
     """What the twin's gyro would have put out without noise, for what a run recorded.
 
     Parameters
     ----------
     twin
-        The twin.
+        A twin, or the name or file of one.
     run
         Its temperatures, table rate, drives and set-up facts are the inputs. Nodes that it lacks and
         an effect asks for follow from those that it has by the twin's plant.
@@ -62,6 +67,7 @@ def replay(twin: Twin, run: Run, *, only: str | None = None, truth: Truth | None
     Signatures are kept with the run: a second replay with one effect changed works out that one
     alone.
     """
+    twin, run = as_twin(twin), one_run(run)
     held = _replayers.setdefault(run, {})
     replayer = held.get(id(truth))
     if replayer is None or replayer.truth is not truth:

@@ -23,7 +23,7 @@ from fogml.twin.recorder import Samples, Worked, looks_ahead_s
 from fogml.twin.replay_after import Storage
 from fogml.twin.truth import TIME_ON, Truth, written_time_on
 from fogml.twin.twin import Twin
-from fogml.twin.twin_file import load_twin
+from fogml.twin.twin_file import as_twin
 from fogml.twin.world import World
 
 Done = TypeVar("Done")
@@ -228,7 +228,7 @@ def world_of(
 ) -> World:
     """A world that has not begun; parameters as `simulate`, `before` is that of the unit's run before."""
     programme = programme if isinstance(programme, Programme) else load_programme(programme)
-    unit = twin if isinstance(twin, Twin) else load_twin(twin)
+    unit = as_twin(twin)
     facts = default_facts(programme) if facts is None else facts
     steps = "steps of its own" if programme.name == "programme" else f"programme {programme.name}"
     notes = f"synthetic: {steps}, twin {unit.name}, seed {seed}"

@@ -49,6 +49,21 @@ def twin_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in TWIN_FOLDER.glob("*.yaml")))
 
 
+def as_twin(twin: Twin | str | Path) -> Twin:
+    """A twin, or the twin of a name or file.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or `load_twin` refuses it.
+    """
+    if isinstance(twin, Twin):
+        return twin
+    if not isinstance(twin, str | Path):
+        raise InputError(f"a twin, or the name or file of one, is needed, found {type(twin).__name__}")
+    return load_twin(twin)
+
+
 def load_twin(source: str | Path | Mapping[str, Any]) -> Twin:
     """A twin by its name, from a YAML file, or from the values of one.
 

@@ -17,9 +17,9 @@ import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import FogmlError, InputError, counted
-from fogml.models.card import runs_of
 from fogml.models.table import usable_rows
 from fogml.numerals import short
+from fogml.runs.exchange import runs_of
 from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
 from fogml.signals.averages import AVERAGING_S, block_averages

@@ -11,8 +11,8 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.base import NOT_FULL
-from fogml.models.card import runs_of
 from fogml.numerals import percent
+from fogml.runs.exchange import runs_of
 from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes

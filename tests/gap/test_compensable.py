@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fogml.arrays import FloatArray
 from fogml.features.grammar import parse_terms
 from fogml.features.parse import parse_features
 from fogml.gap.compensation import Recorded, _span, constants_features, features_of
 from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.signals.bases import preisach
+from fogml.twin.effect import BiasEffect
+from fogml.twin.inputs import Inputs
+from fogml.twin.quantities import shared, signed
 from fogml.twin.registry import effects
 
 COLUMNS = frozenset(
@@ -41,6 +45,29 @@ def test_each_family_of_the_bias_is_a_span() -> None:
         own = declared.family in ("signature", "ageing") or declared.drawn_per_run
         if declared.stage == "bias" and not own:
             assert _span(declared, {}, EVERYTHING), declared.family
+
+
+def test_an_effect_of_ones_own_is_the_features_that_it_states() -> None:
+    class Late(BiasEffect):
+        """A lag of one's own."""
+
+        amplitude = signed("deg/h", (0.05, 2.0), (0.002, 0.1), "", 1e3)
+        shape = (shared("mount", "s", (300.0, 3000.0), "", (1.0, 1e5)),)
+        needs = ("T",)
+        compensated_by = ("T", "lag(T, {mount:g} s)")
+
+        def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
+            return inputs.memory.lag(self.id, inputs.time, inputs.temperature("T"), shape["mount"])
+
+    late = Late()
+    forms = [{"mount": 600.0}, {"mount": 900.0}]
+    texts = ("T", "lag(T, 600 s)", "lag(T, 900 s)")
+    assert features_of(late, forms, ONE_SENSOR) == (texts, "")
+    late.compensated_by = ("lag(T_electronics, {mount:g} s)",)  # type: ignore[misc]
+    assert features_of(late, forms, ONE_SENSOR) == ((), "the runs do not record what drives it")
+    assert features_of(late, forms[:1], EVERYTHING) == (("lag(T_electronics, 600 s)",), "")
+    late.compensated_by = ()  # type: ignore[misc]
+    assert features_of(late, forms, ONE_SENSOR) == ((), "no features that hold it are stated")
 
 
 def test_powers_of_plays_hold_a_smooth_plane_of_relays() -> None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from sklearn.linear_model import Ridge
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.gap import diagnose
 from fogml.models.names import MODEL_NAMES, make_model
 from fogml.models.saved import load_model, save_model
 from fogml.models.table import RunRows, averaging_of
@@ -17,6 +21,10 @@ from fogml.report.train_page import train_page
 from fogml.runs.facts import Facts
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
+from fogml.runs.writing import write_run
+from fogml.testing import check_model
+from fogml.twin.replay import replay
+from fogml.twin.twin_file import load_twin
 from fogml.validation.inspection import inspection_json
 from fogml.validation.judge import judge
 
@@ -148,3 +156,33 @@ def test_averages_are_longer_for_bursts_alone() -> None:
     bursts = time[time % 20.0 < 5.0]
     held = averaging_of([RunRows(np.zeros((len(bursts), 1)), np.zeros(len(bursts)), bursts)], 15.0)
     assert 4.0 * 15.0 <= held <= 8.0 * 15.0
+
+
+STILL = run_of(np.random.default_rng(2).normal(size=60), np.linspace(20.0, 30.0, 60), 60.0)
+MEAN = make_model("mean").fit(STILL)
+TABLE = pd.DataFrame({"time": [0.0]})
+
+
+@pytest.mark.parametrize(
+    ("action", "told"),
+    [
+        (lambda: write_run(TABLE, "x.csv"), "runs are needed, found DataFrame"),  # type: ignore[arg-type]
+        (lambda: MEAN.compensate([STILL]), "one run is needed, found list"),  # type: ignore[arg-type]
+        (lambda: noise_report("run.csv"), "runs are needed, found str"),  # type: ignore[arg-type]
+        (lambda: replay("nominal", "run.csv"), "runs are needed, found str"),  # type: ignore[arg-type]
+        (lambda: replay(None, STILL), "the name or file of one, is needed, found NoneType"),  # type: ignore[arg-type]
+        (lambda: diagnose("nominal", TABLE), "runs are needed, found DataFrame"),  # type: ignore[arg-type]
+        (lambda: diagnose("nominnal", [STILL]), "no such twin; did you mean 'nominal'"),
+        (lambda: save_model(Ridge(), "x"), r"FeatureModel\('T, dT', Ridge\(\)\)"),  # type: ignore[arg-type]
+        (lambda: check_model(Ridge()), "a drift model is needed, found Ridge"),  # type: ignore[arg-type]
+        (lambda: make_model("polynomial", ["T"]), "a text such as"),  # type: ignore[arg-type]
+        (lambda: Run("x", STILL.columns, {"unit": "U"}), "x: facts are dict"),  # type: ignore[arg-type]
+    ],
+)
+def test_what_is_another_thing_than_asked_is_named(action: Callable[[], object], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        action()
+
+
+def test_a_replay_takes_a_twin_by_its_name() -> None:
+    np.testing.assert_array_equal(replay("nominal", STILL), replay(load_twin("nominal"), STILL))

@@ -126,3 +126,8 @@ def test_a_name_of_a_model_of_fogmls_own_is_refused(tmp_path: Path) -> None:
     )
     told = said(tmp_path, "polynomial = fogml_trimmed:TrimmedRegressor", code)
     assert told.startswith("entry point 'polynomial' of fogml-trimmed") and "has to name another" in told
+
+
+def test_sealed_processes_of_the_benchmark_may_read_it(tmp_path: Path) -> None:
+    code = "from fogml.benchmark.answers import _folder_of; print(_folder_of('trimmed'), _folder_of('mean'))"
+    assert said(tmp_path, "trimmed = fogml_trimmed:TrimmedRegressor", code) == f"{OUTSIDE / 'src'} None"
