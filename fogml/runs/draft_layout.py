@@ -153,7 +153,7 @@ class _Header:
 
 def _are_names(cells: Sequence[str]) -> bool:
     """Whether the cells of a line are names, numbers beside those of a time and a gyro apart."""
-    if not "".join(cells).replace("\t", "").isprintable():
+    if re.search(r"[\0-\x08\x0e-\x1f]", "".join(cells)):
         return False
     if not any(is_number_like(cell.strip(' "')) for cell in cells):
         return True
