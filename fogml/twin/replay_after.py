@@ -26,6 +26,10 @@ from fogml.twin.twin import EffectSetting, Twin
 _ROWS = 600
 """Samples of a storage, the closer the sooner after the run before: every state fades by its own time."""
 _FIRST_S = 10.0
+_CARRIED_S = 60.0
+"""How long before a run what acts on the output is that of storage [s]: as long as a unit is carried."""
+_INSTANT_S = 1e-3
+"""How long before a run the unit is still in storage [s]: soon enough that no node's temperature moves."""
 START_SLACK = 1e-3
 """Of a sample, that a run may begin before the one before has ended: what times are rounded by."""
 
@@ -77,11 +81,18 @@ def later_s(facts: Facts, first: Facts, name: str) -> float:
 
 
 def storage_times(start: float, stop: float) -> FloatArray:
-    """Samples from `start` to before `stop` [s]; none where nothing lies between."""
+    """Samples from `start` to the instant before `stop` [s]; none where nothing lies between.
+
+    Air is linear between samples, which lie ever farther apart: without more of them it would go to that of
+    the next run for hours before. The last is the plant's alone. What acts on the output is taken without it,
+    as sensors that begin elsewhere than storage left them would have a rate out of reach.
+    """
     span = stop - start
     if not span > 0.0:
         return np.empty(0)
-    return np.asarray(start + _FIRST_S * np.expm1(np.linspace(0.0, math.log1p(span / _FIRST_S), _ROWS))[:-1])
+    time = start + _FIRST_S * np.expm1(np.linspace(0.0, math.log1p(span / _FIRST_S), _ROWS)[:-1])
+    carried = [stop - _CARRIED_S] if time[-1] < stop - _CARRIED_S else []
+    return np.concatenate((time, carried, [max(stop - _INSTANT_S, 0.5 * (time[-1] + stop))]))
 
 
 def storage_drives(time: FloatArray, storage: Storage, last: Mapping[str, float]) -> dict[str, FloatArray]:
@@ -183,7 +194,7 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
     parts: list[tuple[FloatArray, dict[str, FloatArray], FloatArray, dict[str, FloatArray]]] = []
     windows: PowerWindows = ()
     left: dict[str, float] | None = None
-    ended, network = 0.0, twin.network
+    since, ended, network = 0.0, 0.0, twin.network
     for number, one in enumerate(runs):
         replayer = Replayer(one)
         begins = later_s(one.facts, runs[0].facts, one.name)
@@ -198,12 +209,14 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
             assert left is not None
             between = storage_times(ended, begins)
             if len(between):
-                state = plant_state(network, float(parts[-1][0][-1]), left)
+                state = plant_state(network, since, left)
                 nodes = stored_nodes(network, between, storage, windows, state)
                 last = {name: float(values[-1]) for name, values in parts[-1][3].items()}
+                left = {name: float(values[-1]) for name, values in nodes.items()}
+                since = float(between[-1])
+                between, nodes = between[:-1], {name: values[:-1] for name, values in nodes.items()}
                 drives = storage_drives(between, storage, last)
                 parts.append((between, _with_sensor(nodes), np.zeros(len(between)), drives))
-                left = {name: float(values[-1]) for name, values in nodes.items()}
         else:
             windows = own
         nodes = estimate_nodes(
@@ -213,8 +226,9 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
             powered=windows,
             fan=given.drives.get("fan"),
             table_rate=given.afresh().turning_deg_s,
-            state=_state_after(network, given.temperatures, parts[-1][0] if parts else None, left),
+            state=_state_after(network, given.temperatures, since, left),
         )
+        since = float(time[-1])
         left = {name: float(values[-1]) for name, values in nodes.items()}
         temperatures = {**_with_sensor(nodes), **given.temperatures}
         parts.append((time, temperatures, given.table_rate, dict(given.drives)))
@@ -260,16 +274,16 @@ def _in_order(run: Run, after: Sequence[Run]) -> list[Run]:
 def _state_after(
     network: ThermalNetwork,
     recorded: Mapping[str, FloatArray],
-    time: FloatArray | None,
+    time: float,
     left: Mapping[str, float] | None,
 ) -> EstimateState | None:
     """Where nodes that are not recorded go on from; at rest where nothing went before."""
-    if time is None or left is None:
+    if left is None:
         return None
     known = [name for name in network.names if name in recorded]
     if "T" in recorded and "T_in" not in known:
         known.append("T_in")
-    return EstimateState(nodes=plant_state(network.held_at(*known), float(time[-1]), left))
+    return EstimateState(nodes=plant_state(network.held_at(*known), time, left))
 
 
 def _drive(

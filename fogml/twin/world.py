@@ -180,10 +180,12 @@ class World:
         time = storage_times(before.end_s, self.clock_s)
         if not len(time):
             return
-        drives = storage_drives(time, storage, before._last_drives)
+        acting = time[:-1]
+        drives = storage_drives(acting, storage, before._last_drives)
         for branch in (self._main, *self._without.values()):
             nodes = stored_nodes(branch.network, time, storage, self._windows, branch.state)
-            inputs = self._inputs(branch, time, nodes, np.zeros(len(time)), drives)
+            nodes = {name: values[:-1] for name, values in nodes.items()}
+            inputs = self._inputs(branch, acting, nodes, np.zeros(len(acting)), drives)
             through_chain(branch.twin, inputs, inputs)
             if branch is self._main:
                 for name in filter(is_temperature, self.columns):
