@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from typing import Literal
@@ -16,6 +17,7 @@ from fogml.monitor.changes import Chart, Shape, change_chart
 from fogml.monitor.evidence import ChangePrior
 from fogml.monitor.record import FIGURES, RunRecord
 from fogml.monitor.trend import trend_interval
+from fogml.numerals import in_order_of_serial
 
 DAY_S = 86400.0
 NEAREST: dict[tuple[str, Shape], tuple[str, ...]] = {
@@ -137,10 +139,32 @@ def watch(
     if bias_limit is not None and not 0.0 < bias_limit < np.inf:
         raise InputError(f"bias limit {bias_limit:g} deg/h: a positive number is needed")
     ordered = sorted(records, key=lambda record: (record.unit, record.axis))
-    return [
+    units = [
         _watched(list(group), runs_between_false_alarms, bias_limit, prior or ChangePrior())
         for _, group in groupby(ordered, key=lambda record: (record.unit, record.axis))
     ]
+    alike: dict[tuple[str, str], list[UnitWatch]] = {}
+    for unit in units:
+        alike.setdefault((_as_read(unit.unit), _as_read(unit.axis)), []).append(unit)
+    return [_beside(unit, alike[_as_read(unit.unit), _as_read(unit.axis)]) for unit in units]
+
+
+def _as_read(name: str) -> str:
+    """A name as people read it, whatever its case, spaces and widths of letters."""
+    return " ".join(unicodedata.normalize("NFKC", name).casefold().split())
+
+
+def _beside(unit: UnitWatch, alike: Sequence[UnitWatch]) -> UnitWatch:
+    """The unit, with a note where others are named like it: runs of one unit may be split over them."""
+    others = [f"'{other.unit}' {other.axis}".strip() for other in alike if other is not unit]
+    if not others:
+        return unit
+    note = (
+        f"'{unit.unit}' and {listed(others, 3)} are kept as units of their own and differ in case, spaces or "
+        "widths of letters alone; where they are one, state one name in the side files and give all runs "
+        "again with another --store"
+    )
+    return replace(unit, notes=(*unit.notes, note))
 
 
 def _watched(
@@ -219,12 +243,17 @@ def _in_order(records: Sequence[RunRecord], dated: bool) -> tuple[list[RunRecord
     Of one run under two models the later record is the last: which model counts is no matter of chance.
     """
     if not dated:
-        placed = sorted(records, key=lambda record: (record.monitored, record.run, record.key))
+        placed = sorted(records, key=lambda record: (record.monitored, *_named(record)))
         return placed, np.arange(float(len(placed)))
     moments = {record.key: datetime.fromisoformat(record.started) for record in records}
-    placed = sorted(records, key=lambda record: (moments[record.key], record.monitored, record.key))
+    placed = sorted(records, key=lambda record: (moments[record.key], record.monitored, *_named(record)))
     first = moments[placed[0].key]
     return placed, np.array([(moments[r.key] - first).total_seconds() / DAY_S for r in placed])
+
+
+def _named(record: RunRecord) -> tuple[list[tuple[int, int | str]], str]:
+    """What orders runs of one moment: the numbers in their names, so that run 10 follows run 9."""
+    return in_order_of_serial(record.run), record.key
 
 
 def _calibration(age: FloatArray, level: FloatArray, limit: float, wanders: bool) -> Calibration | None:

@@ -75,6 +75,25 @@ def test_units_are_kept_apart():
     assert [(u.unit, u.state) for u in units] == [("FOG-10", "alarm"), ("FOG-2", "steady")]
 
 
+def test_units_that_may_be_one_say_so():
+    """A unit's runs under names that read alike: each is too few to tell a change, which nobody was told."""
+    names = ("FOG-1", "fog-1 ", "\N{FULLWIDTH LATIN CAPITAL LETTER F}OG-1", "FOG-01", "1")
+    notes = {
+        unit.unit: " ".join(unit.notes) for unit in watch([r for n in names for r in service(5, unit=n)])
+    }
+    for name in names[:3]:
+        assert all((f"'{other}' x" in notes[name]) == (other != name) for other in names[:3])
+    assert not notes["FOG-01"] and not notes["1"]
+
+
+@pytest.mark.parametrize("started", ["", "2026-03-01T08:00:00+00:00"])
+def test_runs_of_one_moment_stand_by_the_numbers_in_their_names(started):
+    """Monitored within a second: run 10 stood before run 2, or anywhere where all state one day."""
+    records = [replace(one, run=f"run-{n}.csv", started=started) for n, one in enumerate(service(12))]
+    (unit,) = watch(records[::-1])
+    assert [record.run for record in unit.records] == [f"run-{n}.csv" for n in range(12)]
+
+
 def test_a_new_model_begins_a_new_chart():
     records = service(step_at=10)
     exchanged = [replace(r, model="new") if i >= 10 else r for i, r in enumerate(records)]
