@@ -62,10 +62,9 @@ class Line:
     Attributes
     ----------
     scale_factor, se, ci90
-        Output over input, its standard error, and the interval that holds it with 90 %. The rates' scatter
-        about the line counts as noise of two parts, one that goes with the rate, such as the table's; so does
-        nonlinearity other than asymmetry, which one way through the rates does not tell from it. None where
-        nothing is left over.
+        Output over input, its standard error, and the interval that holds it and the mean of both senses'
+        with 90 %. The rates' scatter about the line counts as noise of two parts, one that goes with the rate,
+        such as the table's; so does nonlinearity other than asymmetry. None where nothing is left over.
     nonlinearity_ppm, nonlinearity_ci90_ppm
         Greatest deviation of a rate's output from the line over the greatest output; None for fewer than
         four rates. Its 90 % interval is `fogml.lab.rate_errors.nonlinearity_within`'s, which takes the run.
@@ -191,22 +190,23 @@ def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
         if by_time is not None:
             gain = gain - float(gain @ plateaus.time) * by_time
         # What the plateaus' own noise makes, or what they scatter by, whichever is more.
-        noise = float(np.mean(plateaus.error**2))
-        return spread_of(gain, explained, plateaus.output, scatter, least=noise)
+        return spread_of(gain, explained, plateaus.output, scatter, least=float(np.mean(plateaus.error**2)))
 
-    asymmetry, asymmetry_ends = None, None
+    asymmetry, asymmetry_ends, uneven = None, None, 0.0
     if two_sided:
-        gain = 2e6 * np.linalg.pinv(matrix)[-1] / scale
+        mean, _, half = np.linalg.pinv(matrix)
+        # What asymmetry makes of the line where one sense has more rates.
+        uneven, gain = abs(scale - float(mean @ above)), 2e6 * half / scale
         asymmetry, told = float(gain @ above), known(gain)
         if told is not None:
             asymmetry_ends = (asymmetry - told.half_width, asymmetry + told.half_width)
-    means = [np.bincount(level, values) / count for values in (rate, above)]
     found = known(np.linalg.pinv(np.column_stack([rate, constant]))[0])
+    half_width = uneven + (0.0 if found is None else found.half_width)
     return Line(
         scale,
         None if found is None else found.se,
-        None if found is None else (scale - found.half_width, scale + found.half_width),
-        nonlinearity_ppm(*means),
+        None if found is None else (scale - half_width, scale + half_width),
+        nonlinearity_ppm(*(np.bincount(level, values) / count for values in (rate, above))),
         asymmetry,
         asymmetry_ends,
     )
