@@ -63,7 +63,7 @@ class Line:
     ----------
     scale_factor, se, ci90
         Output over input, its standard error, and the interval that holds it and the mean of both senses'
-        with 90 %. The rates' scatter about the line counts as noise of two parts, one that goes with the rate,
+        with 90 %. The rates' scatter about the line counts as noise of two parts, one that goes with rate,
         such as the table's; so does nonlinearity other than asymmetry. None where nothing is left over.
     nonlinearity_ppm, nonlinearity_ci90_ppm
         Greatest deviation of a rate's output from the line over the greatest output; None for fewer than
