@@ -253,19 +253,38 @@ _declared: dict[str, Declared] = {}
 _looked_up = False
 
 
-def declare(operator: Declared) -> Declared:
+def declare(operator: Declared, *, again: bool = False) -> Declared:
     """Make an operator or a window known by its name.
+
+    Parameters
+    ----------
+    operator
+        The declaration.
+    again
+        Whether it takes the place of another one of its name, as where a cell of a notebook runs again;
+        features that name it compute it from then on, so fit models that have them again.
+
+    Returns
+    -------
+    Function, Recursion or Kernel
+        The declaration.
 
     Raises
     ------
     InputError
-        If another one has the name, or feature text has it for something else.
+        If it is none, another one has the name, or feature text has it for something else.
     """
+    if not isinstance(operator, Declared):
+        kind = type(operator).__name__
+        raise InputError(f"a Function, a Recursion or a Kernel is declared, found {kind}")
     if operator.name in (*FUNCTIONS, *METHODS):
         raise InputError(f"operator {operator.name}: the name is feature text's own")
-    known = _declared.setdefault(operator.name, operator)
-    if known != operator:
-        raise InputError(f"operator {operator.name}: the name is taken")
+    if again:
+        _declared[operator.name] = operator
+    if _declared.setdefault(operator.name, operator) != operator:
+        raise InputError(
+            f"operator {operator.name}: the name is taken; declare(..., again=True) puts this in its place"
+        )
     return operator
 
 

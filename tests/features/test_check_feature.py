@@ -15,6 +15,7 @@ from fogml.features.parse import parse_features
 from fogml.features.traced import larger
 from fogml.signals.kernel_windows import Kernel
 from fogml.testing import check_feature
+from fogml.testing.features import synthetic_runs
 
 
 @pytest.mark.parametrize(
@@ -165,3 +166,16 @@ def test_functions_of_another_number_of_values_are_refused_where_they_are_declar
             Kernel("fewer", weights)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="there is no operator 'plai'"):
         parse_features("plai(T, 3 degC)")
+
+
+def test_a_declaration_takes_anothers_place_where_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(own, "_declared", {})
+    declare(Function(name="most", function=lambda x: x))
+    features, run = parse_features("most(T)"), synthetic_runs(parse_features("T"))[0]
+    np.testing.assert_array_equal(features.transform(run)[:, 0], run.columns["T"])
+    with pytest.raises(InputError, match="again=True"):
+        declare(Function(name="most", function=lambda x: 2.0 * x))
+    declare(Function(name="most", function=lambda x: 2.0 * x), again=True)
+    np.testing.assert_array_equal(features.transform(run)[:, 0], 2.0 * run.columns["T"])
+    with pytest.raises(InputError, match="a Function, a Recursion or a Kernel is declared, found function"):
+        declare(lambda x: x)  # type: ignore[arg-type]
