@@ -12,7 +12,7 @@ from fogml.cli.run_commands import MonitorSettings
 from fogml.cli.runs import check_named_once, note_wrong, open_run
 from fogml.cli.terminal import UNITS_SHOWN, Terminal
 from fogml.errors import InputError, counted, in_one_line
-from fogml.fleet.tasks import FLEET
+from fogml.fleet.tasks import FAILED, FLEET
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.models.base import DriftModel
 from fogml.monitor.evidence import ChangePrior
@@ -112,13 +112,14 @@ def _models(place: Path) -> Callable[[Run], DriftModel]:
         return lambda run: model
     fleet: dict[str, Any] = read_json(place / FLEET, "name the folder of a fleet's results")
     try:
-        # Beside the job that trains a unit's model there may be others, which keep none.
+        # Beside the job that trains a unit's model there may be others, which keep none; where it failed, the
+        # folder may hold the model of an earlier one.
         folders = {
             (unit["unit"], unit["axis"]): folder
             for unit in fleet["units"]
-            if (folder := place / str(unit["folder"]) / "model").is_dir()
+            if unit.get("status") != FAILED and (folder := place / str(unit["folder"]) / "model").is_dir()
         }
-    except (KeyError, TypeError):
+    except (KeyError, TypeError, AttributeError):
         raise InputError(f"{place / FLEET}: lists no units; run the fleet again") from None
     load = cache(load_model)
 
@@ -128,7 +129,7 @@ def _models(place: Path) -> Callable[[Run], DriftModel]:
         if folder is None:
             raise InputError(
                 f"{run.name}: of unit '{unit}', axis '{axis}', of which {place} holds no model; state 'unit' "
-                "and 'axis' in its side file as the fleet's manifest does, where its job is 'train'"
+                "and 'axis' in its side file as the fleet's manifest does, of a job 'train' that is done"
             )
         return load(folder)
 

@@ -116,7 +116,7 @@ def test_a_fleet_s_models_are_found_by_unit(tmp_path, invoke_json, invoke):
     assert "holds no model" in told.stderr
 
 
-def test_a_unit_s_jobs_without_a_model_hide_none(tmp_path, invoke_json):
+def test_a_unit_s_jobs_without_a_model_hide_none(tmp_path, invoke, invoke_json):
     """Before, the last line of a unit counted, and a fleet with reports beside models watched no run."""
     (tmp_path / "trained").mkdir()
     write_model(tmp_path / "trained")
@@ -125,6 +125,11 @@ def test_a_unit_s_jobs_without_a_model_hide_none(tmp_path, invoke_json):
     (tmp_path / "fleet.json").write_text(json.dumps({"units": about}))
     told = invoke_json("monitor", tmp_path, write_run(tmp_path, 5), "-o", tmp_path / "out")
     assert told["runs"] == {"added": 1, "repeated": 0} and not told["refused"]
+    # A model of before the unit failed is no longer the fleet's.
+    about[0]["status"] = "failed"
+    (tmp_path / "fleet.json").write_text(json.dumps({"units": about}))
+    told = invoke("monitor", tmp_path, write_run(tmp_path, 6), "-o", tmp_path / "out", status=2)
+    assert "holds no model" in told.stderr
 
 
 def test_of_many_units_those_that_changed_are_shown_first(service, tmp_path, invoke, monkeypatch):
