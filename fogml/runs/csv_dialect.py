@@ -16,7 +16,7 @@ from fogml.runs.encodings import encoding_of
 from fogml.runs.header_spelling import DATE_NAMES, MILLISECOND_NAMES
 from fogml.runs.raw_table import empty_file, wanted_cells
 from fogml.runs.stamp_forms import FRACTION, StampForm
-from fogml.runs.stamps import MILLISECONDS, Stamps, stamps_of
+from fogml.runs.stamps import DECIMALS, MILLISECONDS, Stamps, stamps_of
 
 _HEAD_BYTES = 1 << 16
 _LINE_END = re.compile(r"\r\n|\r|\n")
@@ -231,21 +231,28 @@ def _clock(
         columns = (*stamps.columns[:-1], (whole, form), (whole + 1, StampForm(FRACTION)))
         named = (*cells[:place], "time of day", "time [s]", *cells[place + 1 :])
         return named, replace(begin, columns=tuple((i, f) for i, f in columns))
-    if (first := _milliseconds(cells, rows, place)) is not None:
-        columns = (*stamps.columns, (place + 1, StampForm(FRACTION, part_digits=3)))
+    if (parts := _parts_of_seconds(cells, rows, place)) is not None:
+        first, digits = parts
+        columns = (*stamps.columns, (place + 1, StampForm(FRACTION, part_digits=digits)))
         named = (*cells[:place], "time of day", "time [s]", *cells[place + 2 :])
-        return named, replace(stamps, columns=columns, first_ns=stamps.first_ns + first * 1_000_000)
+        return named, replace(stamps, columns=columns, first_ns=stamps.first_ns + first)
     return (*cells[:place], "time [s]", *cells[place + 1 :]), stamps
 
 
-def _milliseconds(cells: Sequence[str], rows: Sequence[Sequence[str]], place: int) -> int | None:
-    """The first row's milliseconds where a column of them stands right of times of day; else None."""
-    names = [parse_header(cell)[0].lower() for cell in cells[place + 1 : place + 2]]
+def _parts_of_seconds(
+    cells: Sequence[str], rows: Sequence[Sequence[str]], place: int
+) -> tuple[int, int] | None:
+    """The first row's part of a second [ns] where a column of them stands right of times of day; else None.
+
+    They are whole milliseconds, of as many digits, where its name says so, or decimals behind a point.
+    """
+    names = {parse_header(cell)[0].lower() for cell in cells[place + 1 : place + 2]}
     texts = [row[place + 1].strip() for row in rows if len(row) >= len(cells) > place + 1]
-    if not texts or not set(names) <= MILLISECOND_NAMES:
-        return None
-    fits = [bool(re.fullmatch(MILLISECONDS, text)) for text in texts]
-    return int(texts[0]) if fits[0] and 2 * sum(fits) > len(fits) else None
+    for form, digits in ((MILLISECONDS, 3), (DECIMALS, 0)):
+        fits = [bool(re.fullmatch(form, text)) for text in texts]
+        if fits and fits[0] and 2 * sum(fits) > len(fits) and (not digits or names <= MILLISECOND_NAMES):
+            return round(float(texts[0]) * (1e6 if digits else 1e9)), digits
+    return None
 
 
 def _fractions(rows: Sequence[Sequence[str]], width: int, place: int) -> int | None:

@@ -70,6 +70,20 @@ def labview_header(lines: Sequence[str]) -> LabviewHeader | None:
     return LabviewHeader(place, separator, cells)
 
 
+def campbell_header(lines: Sequence[str]) -> LabviewHeader | None:
+    """The header of a table of Campbell Scientific's loggers (TOA5); None of another.
+
+    Names stand in its second line, units in the third, and how values were processed in the fourth.
+    """
+    rows = [next(csv.reader([line]), []) for line in lines[:4]]
+    if len(rows) < 4 or rows[0][:1] != ["TOA5"] or len(rows[1]) != len(rows[2]):
+        return None
+    stated = zip(rows[1], rows[2], strict=True)
+    # TS and RN are times and numbers of records.
+    cells = [f"{name} [{unit}]" if unit not in ("", "TS", "RN") else name for name, unit in stated]
+    return LabviewHeader(3, ",", cells)
+
+
 SEPARATORS = (",", ";", "\t")
 _MOST_TITLE_LINES = 100
 _LINES_BELOW = 5
@@ -124,8 +138,8 @@ def find_header(lines: Sequence[str]) -> Header | None:
         filled = filled[1:]
     if not filled:
         return None
-    if (labview := labview_header(lines)) is not None:
-        place, separator, cells = labview
+    if (stated_by_format := labview_header(lines) or campbell_header(lines)) is not None:
+        place, separator, cells = stated_by_format
         return Header(place, place + 1, separator, canonical_cells(cells))
     plain = []
     for i in filled[:_MOST_TITLE_LINES]:

@@ -16,7 +16,14 @@ from fogml.errors import InputError
 from fogml.readers.beside import interval_in
 from fogml.runs.columns import parse_header
 from fogml.runs.csv_dialect import decoded_head
-from fogml.runs.csv_header import Header, fields_of, is_number_like, labview_header, with_cells_above
+from fogml.runs.csv_header import (
+    Header,
+    campbell_header,
+    fields_of,
+    is_number_like,
+    labview_header,
+    with_cells_above,
+)
 from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
 from fogml.runs.header_spelling import canonical_cells, uncommented, with_units_below
 from fogml.runs.logger_lines import frames_checked, is_frame, mark_of_line_stamps, stamp_apart
@@ -125,9 +132,9 @@ class _Header:
     @classmethod
     def above(cls, lines: Sequence[str], data: int, width: int, mark: str | None) -> _Header | None:
         """That of the lines above the first one of data; None where they hold none."""
-        if labview := labview_header(lines):
-            spelled = canonical_cells(labview.cells)
-            return cls(labview.line, list(zip(labview.cells, spelled)), is_by_place=True)
+        if stated := labview_header(lines) or campbell_header(lines):
+            spelled = canonical_cells(stated.cells)
+            return cls(stated.line, list(zip(stated.cells, spelled)), is_by_place=True)
         split = [(i, _split(lines[i], mark)) for i in range(data) if lines[i].strip()]
         # A mark of comments between blanks is a field too many.
         is_marked = [
@@ -184,7 +191,8 @@ def _are_below(
 
 def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None, bool]:
     """The separator's name, the lines, the first line of numbers, and whether other lines stand below it."""
-    best: tuple[float, str, list[str], int | None, bool] = (0.0, "comma", _lines(text), None, False)
+    best: tuple[tuple[float, float], str, list[str], int | None, bool]
+    best = (0.0, 0.0), "comma", _lines(text), None, False
     labview = labview_header(_lines(text))
     for name, mark in SEPARATORS.items():
         if labview is not None and mark != labview.separator:
@@ -197,8 +205,13 @@ def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None,
         is_data = [_is_blank(t, mark) or _is_data(_split(t, mark), width, numeric) for t in lines]
         first = _first_of_rows(is_data, [not _is_blank(t, mark) for t in lines])
         numbers = [sum(is_number_like(f.strip(' "')) for f in row) for row in rows]
-        score = float(np.median(numbers)) if numbers else 0.0
-        if first is not None and score > best[0]:
+        # Of separators that make as many numbers one makes them alone: a decimal comma parts their digits.
+        score = (
+            (float(np.median(numbers)), float(np.median(np.subtract(numbers, counts))))
+            if rows
+            else (0.0, 0.0)
+        )
+        if first is not None and score[0] > 0.0 and (best[0][0] == 0.0 or score > best[0]):
             below = zip(is_data[first:], lines[first:], strict=True)
             is_broken = any(not sound or (t.strip() and _is_blank(t, mark)) for sound, t in below)
             best = (score, name, lines, first, is_broken)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 
 TIME = re.compile(r"time|stamp|clock|zeit|epoch|tick|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
-COUNT = re.compile(r"#|sample|index|count|packet|seq|row|scan|record|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE)
+COUNT = re.compile(
+    r"#|sample|index|count|packet|seq|row|scan|record|^id$|^rn$|^n(o|r)?\.?$|^i$|序号", re.IGNORECASE
+)
 DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
 GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
 WARM = re.compile(r"temp|die|oven|therm|^t(\w{0,3}|[_.]\w*)$|温", re.IGNORECASE)

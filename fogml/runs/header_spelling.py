@@ -29,7 +29,7 @@ _DATE_AND_TIME = (("date", "and", "time"), ("datum", "und", "zeit"), ("datum", "
                   ("日期", "和", "时间"))  # fmt: skip
 _SYNONYMS = {
     "time": ("t", "timestamp", "elapsed", "elapsedtime", "zeit", "uhrzeit", "zeitstempel", "时间",
-             "时刻", "采样时间", "indexlevel0", "時刻", "時間", "время",
+             "时刻", "采样时间", "indexlevel0", "時刻", "時間", "время", "heure", "hora",
              *(d + mark + t for d, word, t in _DATE_AND_TIME for mark in ("", "/", ",", word))),
     "gyro": ("gyroscope", "gyrooutput", "gyrorate", "fog", "fogoutput", "fograte", "omega", "ω",
              "angularrate", "angularvelocity", "rotationrate", "drehrate", "kreisel",

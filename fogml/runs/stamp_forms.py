@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 _DATE = (
-    r"(?P<a>\d{4}|\d{1,2})\s*[-/.年\s]\s*(?P<b>\d{1,2}|[A-Za-z]{3,9})\s*[-/.月\s]\s*"
+    r"(?P<a>\d{4}|\d{1,2})(?:\s*[-/.年\s]\s*|\.\s)(?P<b>\d{1,2}|[A-Za-zä]{3,9})\s*[-/.月\s]\s*"
     r"(?P<c>\d{4}|\d{1,2})日?"
 )
 _GAP = "[\\s\u00a0\u202f]*"
@@ -25,11 +25,18 @@ _ZONE = "(?P<z>Z|(?:UTC|GMT)?[+-]\\d{2}(?::?\\d{2})?|UTC|GMT|CES?T|MES?Z|EES?T|M
 """Offsets, and the names of zones that are used for one alone."""
 _TIME = (
     rf"(?P<q>上午|下午|午前|午後|오전|오후)?{_GAP}"
-    r"(?P<H>\d{1,4}):(?P<M>\d{2})(?::(?P<S>\d{2})(?:[.,:](?P<F>\d{1,9}))?)?"
-    rf"{_GAP}(?P<p>[AaPp]\.?{_GAP}[Mm]\.?)?{_GAP}{_ZONE}"
+    r"(?P<H>\d{1,4})[:时時](?P<M>\d{2})(?:[:分](?P<S>\d{2})(?:[.,:](?P<F>\d{1,9}))?)?[分秒]?"
+    rf"(?:{_GAP}Uhr)?{_GAP}(?P<p>[AaPp]\.?{_GAP}[Mm]\.?)?{_GAP}{_ZONE}"
 )
 FORMS = {
     "date and time": rf"^\s*{_DATE}(?:\s*T\s*|[\s_,;]+){_TIME}\s*$",
+    "date and time in words": (
+        rf"^\s*(?:[A-Za-z]{{3,9}},?\s+)?(?P<b>[A-Za-z]{{3,9}})\s+(?P<c>\d{{1,2}}),?\s+(?P<a>\d{{4}})[\s,]+{_TIME}\s*$"
+    ),
+    "date and time as C writes it": (
+        r"^\s*[A-Za-z]{3} (?P<b>[A-Za-z]{3}) +(?P<c>\d{1,2}) (?P<H>\d{2}):(?P<M>\d{2}):(?P<S>\d{2}) "
+        r"(?P<a>\d{4})\s*$"
+    ),
     "date": rf"^\s*{_DATE}\s*$",
     "time": rf"^\s*{_TIME}\s*$",
     "minutes and seconds": r"^\s*(?P<M>\d{1,3}):(?P<S>\d{2})[.,](?P<F>\d{1,9})\s*$",
@@ -42,7 +49,7 @@ FORMS = {
         rf"(?:[.,](?P<F>\d{{1,9}}))?\s*{_ZONE}\s*$"
     ),
     "duration": r"^\s*(?P<N>\d+(?:[.,]\d+)?) (?P<U>sec|min|hr|days?)\s*$",
-    "fraction of a second": r"^\s*(?P<F>\d{1,9})\s*$",
+    "fraction of a second": r"^\s*[.,]?(?P<F>\d{1,9})\s*$",
     "time in digits": r"^\s*(?P<H>\d{1,2})(?P<M>\d{2})(?P<S>\d{2})(?:[.,](?P<F>\d{1,9}))?\s*$",
     "date in digits": r"^\s*(?P<a>\d{4})(?P<b>\d{2})(?P<c>\d{2})\s*$",
     "date and time in digits": (
@@ -54,6 +61,7 @@ DATES = ("date", "date in digits")
 """Forms of a date alone."""
 FRACTION = "fraction of a second"
 """Digits in a field of their own, where a comma before them separates fields too."""
+_GERMAN_MONTHS = {"mrz": "mar", "mär": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 OPEN = {
     "h?": "two numbers with a colon may be hours and minutes, or minutes and seconds; write them as HH:MM:SS",
@@ -121,7 +129,7 @@ class StampForm:
         elif "a" in parts:
             days, bad = self._days(_whole(parts["a"]), _month(parts["b"]), _whole(parts["c"]))
             total, wrong = total + days * DAY_NS, wrong | bad
-        if "F" in parts:
+        if "S" in parts or "F" in parts:
             seconds, bad = _seconds(parts, self.part_digits)
             total, wrong = total + seconds, wrong | bad
         if "U" in parts:
@@ -212,13 +220,15 @@ def _whole(texts: Any) -> IntArray:
 
 
 def _month(texts: Any) -> IntArray:
-    """Months from their numbers or English names, 0 where there is none."""
+    """Months from their numbers or English or German names, 0 where there is none."""
     import pyarrow as arrow
     import pyarrow.compute as compute
 
     if not compute.any(compute.match_substring_regex(texts, "[A-Za-z]")).as_py():
         return _whole(texts)
     names = compute.utf8_slice_codeunits(compute.utf8_lower(texts), 0, 3)
+    for german, english in _GERMAN_MONTHS.items():
+        names = compute.replace_substring(names, german, english)
     places = compute.index_in(names, value_set=arrow.array(_MONTHS, arrow.string()))
     return values_of(compute.fill_null(places, -1)).astype(np.int64) + 1
 
@@ -247,9 +257,9 @@ def _seconds(parts: dict[str, Any], part_digits: int) -> tuple[IntArray, BoolArr
     """Nanoseconds of times of day, their zone taken off, and which are none."""
     import pyarrow.compute as compute
 
-    none = compute.if_else(compute.is_valid(parts["F"]), "", "")
+    none = compute.if_else(compute.is_valid(next(iter(parts.values()))), "", "")
     of_hours = "H" in parts
-    parts = dict.fromkeys("HMSpqz", none) | parts
+    parts = dict.fromkeys("HMSFpqz", none) | parts
     hour, minute, second = (_whole(parts[key]) for key in "HMS")
     # Minutes without hours may go on beyond 59.
     wrong = ((minute > 59) & of_hours) | (second > 60)

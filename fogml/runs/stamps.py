@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 
 _OPEN_DATES = {"?": "day and month", "y?": "day and year"}
-MILLISECONDS = r"\d{1,3}"
+MILLISECONDS, DECIMALS = r"\d{1,3}", r"\.\d{1,9}"
+"""What stands in a column of parts of a second."""
 PARTS = 6
 """Columns of a clock that has one for each of year, month, day, hour, minute and second."""
 
@@ -149,14 +150,16 @@ def whole_stamps(columns: list[list[str]]) -> list[list[str]]:
     if len(columns) == PARTS:
         return [stamps_of_parts(columns)]
     *before, last = columns
-    if not before or not last or not re.fullmatch(MILLISECONDS, last[0].strip()):
+    first = [text.strip() for text in last[:_FIRST_ROWS]]
+    fits = {kind: sum(bool(re.fullmatch(kind, text)) for text in first) for kind in (MILLISECONDS, DECIMALS)}
+    kind = max(fits, key=lambda one: fits[one])
+    if not before or 2 * fits[kind] <= len(first):
         return columns
-    # What is no number of milliseconds makes no stamp.
-    parts = (part.strip() if re.fullmatch(MILLISECONDS, part.strip()) else "?" for part in last)
-    return [
-        *before[:-1],
-        [f"{text.strip()}.{part:>03}" for text, part in zip(before[-1], parts, strict=True)],
-    ]
+    # What is no part of a second makes no stamp.
+    parts = (part.strip().lstrip(".") if re.fullmatch(kind, part.strip()) else "?" for part in last)
+    digits = 3 if kind == MILLISECONDS else 0
+    stamps = [f"{text.strip()}.{part.zfill(digits)}" for text, part in zip(before[-1], parts, strict=True)]
+    return [*before[:-1], stamps]
 
 
 def stamps_of_parts(parts: Sequence[Sequence[str]]) -> list[str]:

@@ -326,3 +326,21 @@ def test_a_row_cut_short_is_no_footer(tmp_path):
 )
 def test_a_row_of_words_is_one_of_units_where_two_columns_accept_theirs(row, right):
     assert with_units_below(["time", "gyro", "place"], row) == right
+
+
+def test_a_table_of_campbells_loggers_has_names_units_and_no_rows_of_how(tmp_path):
+    """TOA5: names in its second line, units in the third, processing in the fourth."""
+    head = [
+        '"TOA5","CR1000","CR1000","1","CR1000.Std.32","CPU:a.CR1","5","Table1"',
+        '"TIMESTAMP","RECORD","gyro","T_in"',
+        '"TS","RN","deg/s","Deg C"',
+        '"","","Avg","Smp"',
+    ]
+    rows = [
+        f'"2026-03-11 08:00:{i:02d}",{i},{g},{w}' for i, (g, w) in enumerate(zip(GYRO, INNER, strict=True))
+    ]
+    (tmp_path / "a.dat").write_text("\n".join([*head, *rows, ""]))
+    run = read_run(tmp_path / "a.dat")
+    np.testing.assert_allclose(run.gyro, 3600.0 * GYRO)
+    np.testing.assert_allclose(run.columns["T_in"], INNER)
+    np.testing.assert_array_equal(run.time, np.arange(COUNT))

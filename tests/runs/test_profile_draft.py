@@ -563,3 +563,22 @@ def test_a_thermometer_with_a_clock_of_its_own_in_the_file_is_joined(tmp_path, n
 def test_a_thermometer_beside_a_clock_called_t_is_no_clock():
     assert canonical_cells(["t", "gyro", "T"]) == ("time", "gyro", "T")
     assert canonical_cells(["t", "T [degC]"]) == ("time", "T [degC]")
+
+
+def test_a_decimal_comma_among_tabs_is_no_separator(tmp_path):
+    rows = "".join(f"{9 + i % 7},{100 + i}\t{20 + i % 3},{500 + i}\n" for i in range(COUNT))
+    (tmp_path / "a.txt").write_text(rows)
+    draft = draft_profile(tmp_path / "a.txt")
+    assert 'separator: tab\ndecimal: ","\n' in draft and "fields: 2\n" in draft
+
+
+def test_names_of_a_table_of_campbells_loggers_are_told_with_their_units(tmp_path):
+    head = '"TOA5","a","b"\n"TIMESTAMP","RECORD","Gyro_Avg","Coil_Avg"\n'
+    head += '"TS","RN","deg/h","Deg C"\n"","","Avg","Avg"\n'
+    rows = "".join(f'"2026-03-11 08:00:{i:02d}",{i},{i * i % 37}.5,{25 + i / 8}\n' for i in range(COUNT))
+    (tmp_path / "a.dat").write_text(head + rows)
+    (tmp_path / "p.yaml").write_text(draft_profile(tmp_path / "a.dat"))
+    assert "# Fields: 0 time, 1 RECORD, 2 Gyro_Avg, 3 Coil_Avg" in (tmp_path / "p.yaml").read_text()
+    (run,) = import_recording(tmp_path / "a.dat", load_profile(tmp_path / "p.yaml"))
+    np.testing.assert_allclose(run.gyro, np.arange(COUNT) ** 2 % 37 + 0.5)
+    np.testing.assert_allclose(run.columns["T"], 25 + np.arange(COUNT) / 8)

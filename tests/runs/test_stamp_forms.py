@@ -47,8 +47,11 @@ NOON = datetime(2026, 3, 11, 11, 59, 10)
         lambda at: at.strftime("%Y-%m-%d %H:%M:%S+01"),
         lambda at: at.strftime("%Y-%m-%d %H:%M:%S GMT+0800"),
         lambda at: at.strftime("%Y-%m-%d %H:%M:%S CET"),
+        lambda at: at.strftime("%Y年%m月%d日 %H时%M分%S秒"),
+        lambda at: at.strftime("11. Mrz %Y %H:%M:%S Uhr"),
+        lambda at: at.strftime("%a %b %d %H:%M:%S %Y"),
+        lambda at: at.strftime("%b %d %Y %H:%M:%S.%f"),
     ],
-    ids=["a.m.", "blanks in it", "narrow blank", "zh", "ko", "day of year", "CCSDS", "hour", "GMT+", "CET"],
 )
 def test_is_read_over_noon(tmp_path, written):
     path = log(tmp_path / "a.csv", map(written, moments(NOON)))
@@ -196,3 +199,24 @@ def test_a_count_of_milliseconds_that_goes_on_is_no_part_of_a_second(tmp_path):
     texts = [f"08:00:{i // 1000:02d},{i}" for i in range(1400)]
     with pytest.raises(InputError, match="column 'time', line 1002: the value is missing"):
         read_run(log(tmp_path / "a.csv", texts, "Time,ms,gyro [deg/h],T [degC]"))
+
+
+def test_decimals_of_seconds_in_a_column_of_their_own_belong_to_the_clock(tmp_path):
+    """As Yokogawa's recorders write them, with a row of units below."""
+    rows = [
+        f"2026/03/11,08:00:{i // 2:02d},{'.500' if i % 2 else '.000'},{9.5 + i * i % 37},20"
+        for i in range(COUNT)
+    ]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["Date,Time,Sec,Gyro,CH2", ",,,deg/h,C", *rows, ""]))
+    np.testing.assert_allclose(read_run(path).time, 0.5 * np.arange(COUNT))
+    (tmp_path / "p.yaml").write_text(draft_profile(path))
+    (run,) = import_recording(path, load_profile(tmp_path / "p.yaml"))
+    np.testing.assert_allclose(run.time, 0.5 * np.arange(COUNT))
+
+
+def test_every_german_month_is_its_own(tmp_path):
+    names = ["Jan", "Feb", "Mrz", "Apr", "Mai", "Jun", "Jul", "Aug", "Sep", "Okt", "Nov", "Dez"]
+    texts = [f"1. {name} 2026 00:00:00" for name in names]
+    days = np.cumsum([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30])
+    np.testing.assert_array_equal(read_run(log(tmp_path / "a.csv", texts)).time, 86400.0 * days)
