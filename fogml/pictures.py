@@ -258,6 +258,9 @@ class Pictured:
     def __str__(self) -> str:
         return "\n".join(str(line) for line in self._heading() if line)
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {'; '.join(str(self).splitlines())}>"
+
     def _repr_html_(self) -> str:
         head, *lines = self._heading()
         panels = self._panels()

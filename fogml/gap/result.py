@@ -199,7 +199,7 @@ class CandidateEvidence:
     status: Literal["named", "possible", "no_sign", "undetectable", "in_constants"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Pictured):
     """The result of `fogml.gap.diagnose`.
 

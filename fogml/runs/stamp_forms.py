@@ -48,6 +48,9 @@ FORMS = {
         r"^\s*(?P<a>\d{4})[-:/ ](?P<d>\d{3})[T: ](?P<H>\d{2}):(?P<M>\d{2}):(?P<S>\d{2})"
         rf"(?:[.,](?P<F>\d{{1,9}}))?\s*{_ZONE}\s*$"
     ),
+    "days and time": (
+        r"^\s*(?P<N>\d+) (?P<U>days?),? (?P<H>\d{1,2}):(?P<M>\d{2}):(?P<S>\d{2})(?:[.,](?P<F>\d{1,9}))?\s*$"
+    ),
     "duration": r"^\s*(?P<N>\d+(?:[.,]\d+)?) (?P<U>sec|min|hr|days?)\s*$",
     "fraction of a second": r"^\s*[.,]?(?P<F>\d{1,9})\s*$",
     "time in digits": r"^\s*(?P<H>\d{1,2})(?P<M>\d{2})(?P<S>\d{2})(?:[.,](?P<F>\d{1,9}))?\s*$",
@@ -77,7 +80,7 @@ _OFFSETS = {"UTC": "+00", "GMT": "+00", "Z": "+00", "CET": "+01", "MEZ": "+01", 
 NS = 1_000_000_000
 DAY_NS = 86_400 * NS
 _DURATIONS_NS = {"sec": NS, "min": 60 * NS, "hr": 3600 * NS, "day": DAY_NS, "days": DAY_NS}
-"""As MATLAB writes the times of a timetable."""
+"""As MATLAB writes the times of a timetable; pandas writes ``0 days 00:00:00.5``."""
 GOES_ROUND_NS = {"time": DAY_NS, "time in digits": DAY_NS, "minutes and seconds": 3600 * NS}
 
 

@@ -180,7 +180,7 @@ class LimitOutcome:
     met: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Judgement(Pictured):
     """A model judged: what ``report.json`` says, and the series that its page draws."""
 

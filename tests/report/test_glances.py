@@ -43,3 +43,8 @@ def test_a_diagnosis_shows_what_it_says_and_the_gap_of_each_run() -> None:
     assert (found.headline or (found.verdict,))[0] in text
     assert pictures == min(len(found.series), 6)
     assert {trace.name for trace in found.plot().data} == {"gap, recalibrated", "with what was found"}
+
+
+def test_in_a_list_too_they_are_short() -> None:
+    assert len(repr([judgement(1), diagnosis()])) < 1000
+    assert repr(judgement(1)).startswith("<Judgement: ") and repr(diagnosis()).startswith("<Diagnosis: ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pyarrow as arrow
 import pytest
 
@@ -82,3 +83,11 @@ def test_times_as_matlab_writes_those_of_a_timetable(tmp_path, unit, per_s):
     rows = "".join(f"{(90.0 + s) * per_s:g} {unit},{9.5 + s:.2f},20.5\n" for s in seconds)
     (tmp_path / "run.csv").write_text("Time,gyro [deg/h],T [degC]\n" + rows)
     np.testing.assert_allclose(read_run(tmp_path / "run.csv").time, seconds, atol=1e-9)
+
+
+def test_times_as_pandas_writes_those_of_durations(tmp_path):
+    seconds = np.arange(0.0, 200_000.0, 1_800.5)
+    frame = pd.DataFrame({"gyro [deg/h]": np.sin(seconds), "T [degC]": 20.0}, pd.to_timedelta(seconds, "s"))
+    frame.rename_axis("time").to_csv(tmp_path / "run.csv")
+    assert "2 days 0" in (tmp_path / "run.csv").read_text()
+    np.testing.assert_allclose(read_run(tmp_path / "run.csv").time, seconds, atol=1e-8)
