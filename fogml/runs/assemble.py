@@ -28,6 +28,7 @@ from fogml.runs.possible import (
     finite_rows,
     float32_reason,
     order_error,
+    small_shares,
     step_error,
 )
 from fogml.runs.raw_table import RawTable
@@ -57,6 +58,8 @@ def runs_of_table(
     """
     columns, gyro_unit, tick_s, notes = _internal_columns(table)
     findings = [*table.findings, *notes]
+    for column, unit in map(parse_header, table.cells):
+        findings += small_shares(column, unit, columns[column]) if column in columns else []
     return runs_of_columns(
         columns,
         Rows(table.file, table.row_name, table.called),

@@ -13,7 +13,6 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted
 from fogml.numerals import short
-from fogml.runs.columns import DUTY, column_spec
 from fogml.runs.findings import DEAD, SATURATION, Finding, dead_words
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import HOUR_S, implausible
@@ -64,8 +63,6 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         there; not where a quiet output rests at other values as well.
     ``coarse_output``
         The output is rounded to steps that its noise does not fill (`coarse_output`).
-    ``small_shares``
-        A duty or the humidity never reaches more than 1 %, as shares of one do under [%].
     ``outliers``
         Gyro samples over 8 robust sigma off the median of the five about them (`find_outliers`).
     ``small_temperature_span``
@@ -84,7 +81,6 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         _dead,
         _saturated,
         coarse_output,
-        _small_shares,
         _outliers,
         _span,
     )
@@ -112,17 +108,6 @@ def refuse_dead(runs: Iterable[Run]) -> None:
     for run in runs:
         for finding in _dead(run) if not run.facts.synthetic else ():
             raise InputError(f"{run.name}: {finding.message}; leave the run out, or record it again")
-
-
-def _small_shares(run: Run) -> Iterator[Finding]:
-    """Columns of percent that hold shares of one, it seems."""
-    for name, values in run.columns.items():
-        spec = column_spec(name)
-        if spec is not None and "%" in spec.units:
-            percent = float(np.fmax.reduce(values)) / spec.units["%"][0]
-            if 0.0 < percent <= 1.0 + 1e-9:
-                message = f"'{name}' never exceeds {short(percent)} %; are these shares of one? Then write "
-                yield Finding("small_shares", f"{message}'[{DUTY}]' in the header, or a scale", column=name)
 
 
 def _dropouts(run: Run) -> Iterator[Finding]:

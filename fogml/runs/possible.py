@@ -12,7 +12,7 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray, unmasked
 from fogml.errors import InputError
 from fogml.numerals import short
 from fogml.runs.clock_order import Ordered
-from fogml.runs.columns import column_spec, parse_header
+from fogml.runs.columns import DUTY, column_spec, parse_header
 from fogml.runs.findings import Finding
 from fogml.signals import large
 
@@ -257,3 +257,17 @@ def step_error(table: Rows, row: int, repeats: bool, cure: str = "correct it") -
     return InputError(
         f"{table.file}, column 'time', {table.row_name(row)}: time {what}; it must strictly increase: {cure}"
     )
+
+
+def small_shares(name: str, unit: str | None, values: FloatArray) -> list[Finding]:
+    """What is said of a column stated in percent, in internal units, that never exceeds 1 %."""
+    if unit != "%" or (spec := column_spec(name)) is None:
+        return []
+    percent = float(np.fmax.reduce(values, initial=0.0)) / spec.units["%"][0]
+    if not 0.0 < percent <= 1.0 + 1e-9:
+        return []
+    cure = (
+        f"state the unit '{DUTY}'" if DUTY in spec.units else "a profile's 'scale: 100' makes percent of them"
+    )
+    message = f"'{name}' never exceeds {short(percent)} %; where these are shares of one, {cure}"
+    return [Finding("small_shares", message, column=name)]

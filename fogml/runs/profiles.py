@@ -28,7 +28,7 @@ from fogml.runs.logger_rows import (
 )
 from fogml.runs.logger_text import LoggerTable
 from fogml.runs.other_rate import held_beyond
-from fogml.runs.possible import Rows
+from fogml.runs.possible import Rows, small_shares
 from fogml.runs.profile_parts import LeadingJump
 from fogml.runs.profile_schema import ImportProfile, load_profile, profile_names
 from fogml.runs.run import Run
@@ -259,6 +259,7 @@ def _columns(
         source = profile.axes[axis] if name == "gyro" and axis is not None else column.number
         if source is not None:
             columns[name] = internal(large.chosen(table.columns[source], part), name, column)
+            findings += small_shares(name, column.unit, columns[name])
     rows = large.chosen(table.rows, part)
     if profile.sample_s is not None:
         sample_s = np.float64(profile.sample_s)

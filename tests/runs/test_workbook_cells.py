@@ -77,6 +77,9 @@ def test_shares_of_one_under_percent_are_told_of_any_format(tmp_path, name, top,
     rows = [f"{i},{9.6 + 0.01 * (i * i % 11):.2f},{top * i / (COUNT - 1)!r}" for i in range(COUNT)]
     run = read_run(write(tmp_path / "a.csv", "\n".join([f"time [s],gyro [deg/h],{name} [%]", *rows, ""])))
     assert ("small_shares" in codes(run)) is said
+    if name == "heater":
+        text = (tmp_path / "a.csv").read_text().replace("[%]", "[1]")
+        assert "small_shares" not in codes(read_run(write(tmp_path / "b.csv", text)))
 
 
 def test_rows_that_are_hidden_are_read_and_told(tmp_path):
