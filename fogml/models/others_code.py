@@ -40,7 +40,7 @@ def asked(regressor: Any, otherwise: str) -> Iterator[None]:
 
 
 def fitted_to(regressor: Any, X: FloatArray, y: FloatArray, told: dict[str, Any]) -> Any:
-    """The regressor, fitted to a table that it can't write to.
+    """The regressor, fitted to a table that it can't write to; its columns are counted where it does not.
 
     Raises
     ------
@@ -50,7 +50,11 @@ def fitted_to(regressor: Any, X: FloatArray, y: FloatArray, told: dict[str, Any]
     with asked(regressor, "can't be fitted to these runs"):
         found = regressor.fit(read_only(X), read_only(y), **told)
     if not hasattr(found, "predict"):
-        raise InputError(f"{type(regressor).__name__}: its fit has to give itself, not {found!r}")
+        raise InputError(
+            f"{type(regressor).__name__}: its fit has to give itself, with a predict, not {found!r}"
+        )
+    if not hasattr(found, "n_features_in_"):
+        found.n_features_in_ = X.shape[1]
     return found
 
 

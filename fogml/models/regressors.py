@@ -153,25 +153,25 @@ def goes_on_linearly(regressor: Any) -> bool:
 
 
 def parameter_count(regressor: Any) -> int:
-    """Number of fitted parameters; of a scikit-learn regressor, of the numbers that it predicts from."""
+    """Number of fitted parameters; of a regressor that saves none, of the numbers that it predicts from."""
     count = getattr(regressor, "parameter_count", None)
     if count is not None:
         with asked(regressor, "its parameter_count is no number"):
             return int(count() if callable(count) else count)
     if hasattr(regressor, "to_saved"):
-        return sum(array.size for array in regressor.to_saved()[1].values())
+        return sum(array.size for array in saved_by(regressor)[1].values())
     from fogml.models.sklearn_compact import numbers_of
 
     return numbers_of(regressor)
 
 
 def weight_bytes(regressor: Any) -> int:
-    """Bytes of a fitted regressor's arrays; of a scikit-learn one, of those that it predicts from."""
-    if _is_sklearn(regressor):
-        from fogml.models.sklearn_compact import bytes_of
+    """Bytes of a fitted regressor's arrays; of one that saves none, of those that it predicts from."""
+    if hasattr(regressor, "to_saved"):
+        return sum(array.nbytes for array in saved_by(regressor)[1].values())
+    from fogml.models.sklearn_compact import bytes_of
 
-        return bytes_of(regressor)
-    return sum(array.nbytes for array in regressor_to_saved(regressor)[1].values())
+    return bytes_of(regressor)
 
 
 def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:

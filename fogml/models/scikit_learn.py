@@ -53,7 +53,7 @@ def put_off(*names: str) -> Iterator[None]:
 
 
 with put_off("scipy.stats", "pandas"):
-    from sklearn.base import BaseEstimator, RegressorMixin, clone
+    from sklearn.base import BaseEstimator, RegressorMixin, clone, is_regressor
     from sklearn.exceptions import NotFittedError
     from sklearn.utils._param_validation import Interval, StrOptions, make_constraint
     from sklearn.utils.validation import check_is_fitted, validate_data
@@ -66,6 +66,7 @@ __all__ = [
     "StrOptions",
     "check_is_fitted",
     "clone",
+    "is_regressor",
     "make_constraint",
     "validate_data",
 ]

@@ -14,7 +14,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.models.compact import affine
 from fogml.models.rbf.network import Network
-from fogml.models.scikit_learn import BaseEstimator, RegressorMixin
+from fogml.models.scikit_learn import BaseEstimator, is_regressor
 
 _PROBES = 64
 _AFFINE = 1e-9
@@ -266,7 +266,7 @@ def load_sklearn(stored: NDArray[Any]) -> Any:
         raise InputError(
             f"the saved scikit-learn regressor cannot be read ({error}); train it again"
         ) from None
-    if not isinstance(regressor, RegressorMixin):
+    if not is_regressor(regressor):
         raise InputError(f"the saved {type(regressor).__name__} is not a regressor; it is not used")
     return regressor
 

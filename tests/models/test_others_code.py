@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from sklearn.base import BaseEstimator
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from fogml.errors import InputError
 from fogml.models.compact import affine, network_of
 from fogml.models.feature_model import FeatureModel
 from fogml.models.others_code import saved_by
 from fogml.models.regressors import fit_regressor, parameter_count, predict_rows
+from fogml.models.saved import load_model, save_model
 from fogml.models.table import TrainingTable
 from fogml.testing.models import _check_compact, synthetic_run
+from fogml.validation.judge import judge
 
 X = np.random.default_rng(0).normal(size=(20, 2))
 Y = X @ [1.0, 2.0] + 3.0
@@ -65,7 +71,7 @@ def emptied(self: Any, X: Any, y: Any) -> Any:
     ("fit", "message"),
     [
         (emptied, "Odd: can't be fitted to these runs: .*read-only"),
-        (lambda self, X, y: None, "Odd: its fit has to give itself, not None"),
+        (lambda self, X, y: None, "Odd: its fit has to give itself, with a predict, not None"),
         (lambda self, X, y: {}["key"], r"Odd: can't be fitted to these runs: KeyError \('key'\)"),
     ],
 )
@@ -135,3 +141,30 @@ def test_a_compact_form_that_is_not_what_it_predicts_is_found(off: float) -> Non
     held = pytest.raises(AssertionError, match=r"compact: up to 0.01 deg/h") if off else nullcontext()
     with held:
         _check_compact(model, synthetic_run("other", 3.0))
+
+
+class Uncounted(BaseEstimator):  # type: ignore[misc]
+    """Least squares that saves nothing and counts no columns, as one that is tried out."""
+
+    def fit(self, X: Any, y: Any) -> Any:
+        self.coef = np.linalg.lstsq(np.column_stack([X, np.ones(len(X))]), y, rcond=None)[0]
+        return self
+
+    def predict(self, X: Any) -> Any:
+        return X @ self.coef[:-1] + self.coef[-1]
+
+
+def test_one_that_is_only_tried_out_is_judged() -> None:
+    train, other = synthetic_run("train", 2.0), synthetic_run("other", 3.0)
+    model = FeatureModel("T, dT", Uncounted()).fit(train)
+    plain = FeatureModel("T, dT", changed()).fit(train)
+    judged, beside = (judge(one, train, other).test[0].after.rms for one in (model, plain))
+    assert judged == pytest.approx(beside, rel=1e-9)
+    assert (model.parameter_count(), model.weight_bytes()) == (3, 24)
+
+
+def test_a_pipeline_of_scikit_learns_is_saved_and_read(tmp_path: Path) -> None:
+    train = synthetic_run("train", 2.0)
+    model = FeatureModel("T, dT", make_pipeline(StandardScaler(), Ridge())).fit(train)
+    save_model(model, tmp_path / "model")
+    np.testing.assert_array_equal(load_model(tmp_path / "model").predict(train), model.predict(train))
