@@ -226,7 +226,8 @@ def number(field: str, decimal: str, grouped: bool = False) -> float | None:
 
     Marks of thousands are taken out where they can be nothing else, or where a file is known to have them.
     """
-    field = field.strip().replace("\u2212", "-")
+    # A mark of encodings within a file is one of files put together.
+    field = field.strip().lstrip("\ufeff").replace("\u2212", "-")
     if field.lower() in MISSING:
         return np.nan
     if (_GROUPS if grouped else _EVIDENT)[decimal].match(field):

@@ -310,7 +310,8 @@ def _numbers(text: Any, profile: TextLayout) -> Any:
     import pyarrow as pa
     import pyarrow.compute as compute
 
-    plain = compute.replace_substring_regex(compute.utf8_trim_whitespace(text), r'^"(.*)"$', r"\1")
+    text = compute.utf8_ltrim(compute.utf8_trim_whitespace(text), "\ufeff")
+    plain = compute.replace_substring_regex(text, r'^"(.*)"$', r"\1")
     plain = compute.replace_substring(compute.utf8_trim_whitespace(plain), "\u2212", "-")
     decimal = profile.decimal
     if profile.text_separator == decimal:

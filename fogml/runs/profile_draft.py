@@ -255,7 +255,9 @@ def _parts_of_a_clock(fields: Sequence[Field]) -> Sequence[Field]:
 
 
 def _grows(one: Field) -> bool:
-    values = one.numbers
+    """Whether a field's numbers only grow, to the last of them: a shorter log beside may end before."""
+    known = np.flatnonzero(np.isfinite(one.numbers))
+    values = one.numbers[: known[-1] + 1] if len(known) else np.empty(0)
     return len(values) > 1 and bool(np.all(np.diff(values) > 0.0))
 
 

@@ -93,3 +93,11 @@ def test_noise_of_a_line_costs_the_rows_it_hits_and_no_others(tmp_path, place):
     path.write_bytes(content[:at] + b"\x00\xfe\x07\xf0ga,rb,\n" + content[at:])
     (run,) = drafted(path)
     np.testing.assert_array_equal(run.time, TIME)
+
+
+def test_files_put_together_lose_no_row_to_a_mark_of_encoding(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([HEADER, *ROWS[:BREAK], "\ufeff" + ROWS[BREAK], *ROWS[BREAK + 1 :], ""]))
+    for run in (read_run(path), *drafted(path)):
+        np.testing.assert_array_equal(run.time, TIME)
+        assert not {f.code for f in run.findings} & {"rejected_rows", "repaired_rows"}

@@ -501,6 +501,12 @@ def test_what_could_be_another_column_is_a_guess(tmp_path, header, line):
     assert line in draft_profile(tmp_path / "a.csv")
 
 
+def test_the_clock_of_a_shorter_log_beside_is_told(tmp_path):
+    rows = [f"{i},{i * i % 37}.5," + (f"{10 * i},{25 + i / 8}" if i < 9 else ",") for i in range(COUNT)]
+    (tmp_path / "a.csv").write_text("\n".join(["time [s],gyro [deg/h],t2 [s],T [degC]", *rows, ""]))
+    assert '# GUESS: or by "t2 [s]"?' in draft_profile(tmp_path / "a.csv")
+
+
 def test_two_clocks_are_a_guess(tmp_path):
     rows = "".join(f"2026-03-11 08:00:{i:02d}.1,{i},{i * i % 37}.5\n" for i in range(COUNT))
     (tmp_path / "a.csv").write_text(f"PC time,DAQ time [s],gyro [deg/h]\n{rows}")
