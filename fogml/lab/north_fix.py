@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from fogml.arrays import FloatArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.lab.north import DriftError, horizontal_rate
 from fogml.lab.north_schemes import wrapped
 from fogml.numerals import short
 from fogml.runs.run import Run
+from fogml.runs.settling import LEAST_ROWS, unsettled_rows
 
 ANY_DEG = 180.0 / float(np.sqrt(3.0))
 """Root mean square error of an azimuth that may be any."""
@@ -222,3 +224,42 @@ def angle_notes(
         f"{recorded[worst]:g} deg: "
         + ("the other --sense, or an angle of the other sign" if other else "check --sense and --order")
     ]
+
+
+def standing(
+    time: FloatArray, gyro: FloatArray, stay: IndexArray, share: float = 1e-3
+) -> tuple[BoolArray, tuple[str, ...]]:
+    """Samples but those at begins and ends of stays in which all together show the way between positions.
+
+    More than a `share` of the steps of the output: a table's clock is early or late by more than hundredths
+    of a sample, and a bias bends by less. Something of each stay is kept.
+
+    Parameters
+    ----------
+    time, gyro, stay
+        Time [s], output [deg/h] and number of the stay of each sample, from 0 on, shape (n,).
+    share
+        Of a step, what may lack.
+
+    Returns
+    -------
+    standing, notes
+        A mask, shape (n,), and what to mind.
+    """
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(stay)) + 1, [len(stay)]])
+    levels = np.array([np.median(gyro[a:b]) for a, b in pairwise(edges.tolist())])
+    every = (len(gyro), len(gyro))
+    begins, ends = unsettled_rows(gyro, edges, np.diff(levels), (0, 0), every, (share, share))
+    length = np.diff(edges)[stay]
+    row, most = np.arange(len(stay)) - edges[stay], (length - LEAST_ROWS) // 2
+    out = (row < np.minimum(begins, most)) & (stay > 0)
+    out |= (length - row <= np.minimum(ends, most)) & (stay < stay[-1])
+    if not out.any():
+        return ~out, ()
+    step_s, longest = float(np.median(np.diff(time))), int(most.max())
+    told = {"first": min(begins, longest), "last": min(ends, longest)}
+    left_out = [f"the {end} {short(rows * step_s, 3)} s" for end, rows in told.items() if rows]
+    return ~out, (
+        f"{' and '.join(left_out)} of a position are left out: the output shows the way between positions "
+        "there, as where the table's clock is early or late beside the gyro's",
+    )

@@ -16,7 +16,7 @@ from fogml.lab.north import (
     check_design,
     design_matrix,
 )
-from fogml.lab.north_fix import LeftIn, NorthFix, angle_notes, azimuth_se, fix_notes, set_up_notes
+from fogml.lab.north_fix import LeftIn, NorthFix, angle_notes, azimuth_se, fix_notes, set_up_notes, standing
 from fogml.lab.north_schemes import wrapped
 from fogml.models.linear import LinearRegressor
 from fogml.models.row_noise import MEANS_A_STAY, noise_covariance
@@ -28,7 +28,7 @@ METHODS = ("auto", "plain", "drift-observing", "bend-observing")
 
 @dataclass(frozen=True, eq=False)
 class _Stays:
-    """Position, mean, middle time and length [s] of each stay; time, output and stay of every sample."""
+    """Position, mean, middle time and length [s] of each stay; time, output and stay of samples; notes."""
 
     positions: FloatArray
     means: FloatArray
@@ -37,6 +37,7 @@ class _Stays:
     time: FloatArray
     gyro: FloatArray
     stay: IndexArray
+    notes: tuple[str, ...] = ()
 
 
 def north_from_positions(
@@ -131,6 +132,7 @@ def north_from_positions(
     if beyond <= highest:
         left = LeftIn(*_term(fits[beyond], 2 + beyond), found[beyond], azimuth_se(*fits[beyond]))
     notes = [
+        *stays.notes,
         *fix_notes(fix, covariance, left),
         *set_up_notes(run, fix, covariance, latitude_deg),
         *angle_notes(run, stays.times, angles * SENSES[sense], angle_tolerance_deg, fix.azimuth_deg),
@@ -256,12 +258,14 @@ def _stays(run: Run, order_deg: Sequence[float], sense: str, settle_s: float, to
             f"{run.name}: nothing is left of some positions after {settle_s:g} s to settle; leave out less"
         )
     time, gyro = run.time[used], run.gyro_deg_h[used]
+    still, notes = standing(time, gyro, stay)
+    time, gyro, stay = time[still], gyro[still], stay[still]
     counts, level = np.bincount(stay), float(gyro[0])
     means = level + np.bincount(stay, weights=gyro - level) / counts
     times = np.bincount(stay, weights=time) / counts
     ends = np.cumsum(counts)
     lengths = time[ends - 1] - time[ends - counts]
-    return _Stays(position[edges[:-1]][number], means, times, lengths, time, gyro, stay)
+    return _Stays(position[edges[:-1]][number], means, times, lengths, time, gyro, stay, notes)
 
 
 def _sample_noise(stays: _Stays) -> float | None:

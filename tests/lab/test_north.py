@@ -359,3 +359,20 @@ def test_a_coarse_seek_that_takes_all_the_time_is_told_with_what_it_takes() -> N
     """Four positions of 6 s in the 20 s of four of 5 s."""
     _, left_out = ways_of_equal_time(Scheme(dwell_s=5.0), coarse_dwell_s=6.0)
     assert "take 24 of 20 s" in left_out["coarse-fine"]
+
+
+@pytest.mark.parametrize("late_s", [-6, 0, 6, 15])
+def test_positions_on_another_clock_are_cut_to_what_stands(late_s: int) -> None:
+    """Stays of a minute, ways of 10 s; of a steady seek nothing is left out."""
+    position = np.concatenate([np.append(np.full(60, k + 1.0), np.zeros(10)) for k in range(4)])[:-10]
+    angle = np.concatenate(
+        [np.append(np.full(60, 90.0 * k), 90.0 * k + 9.0 * np.arange(10)) for k in range(4)]
+    )[:-10]
+    time, azimuth = np.arange(len(position)), 77.0
+    gyro = 1.0 + 11.5 * np.cos(np.radians(azimuth + angle))
+    gyro += 0.1 * np.random.default_rng(4).standard_normal(len(time))
+    recorded = position[np.clip(time - late_s, 0, len(time) - 1)]
+    fix = north_from_positions(Run("seek", {"time": time * 1.0, "gyro": gyro, "position": recorded}))
+    assert fix.azimuth_deg == pytest.approx(azimuth, abs=0.3) and fix.se_deg < 0.3
+    left_out = [note for note in fix.notes if "of a position are left out" in note]
+    assert [("last" if late_s > 0 else "first") in note for note in left_out] == [True] * bool(late_s)
