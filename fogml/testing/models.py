@@ -13,6 +13,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
+from fogml.json_files import json_text
 from fogml.models.base import GOOD, NOT_FULL, OUTSIDE, DriftModel
 from fogml.models.compact import network_of
 from fogml.models.compensation import compensate_blocks
@@ -139,7 +140,7 @@ def _state(model: DriftModel) -> str:
     values, arrays = model_to_saved(model)
     # skops names the parts of its archive by their places in memory: same objects, other bytes.
     numbers = {name: array.tobytes().hex() for name, array in sorted(arrays.items()) if name != "skops"}
-    return json.dumps([values, numbers], sort_keys=True)
+    return json.dumps(json.loads(json_text([values, numbers], model.kind)), sort_keys=True)
 
 
 def _check_use(model: DriftModel, train: Sequence[Run], other: Run) -> None:

@@ -17,6 +17,7 @@ from fogml.errors import InputError
 from fogml.models.compact import affine, network_of
 from fogml.models.feature_model import FeatureModel
 from fogml.models.others_code import saved_by
+from fogml.models.parameters import arrays_from_bytes, arrays_to_bytes
 from fogml.models.regressors import fit_regressor, parameter_count, predict_rows
 from fogml.models.saved import load_model, save_model
 from fogml.models.table import TrainingTable
@@ -168,3 +169,10 @@ def test_a_pipeline_of_scikit_learns_is_saved_and_read(tmp_path: Path) -> None:
     model = FeatureModel("T, dT", make_pipeline(StandardScaler(), Ridge())).fit(train)
     save_model(model, tmp_path / "model")
     np.testing.assert_array_equal(load_model(tmp_path / "model").predict(train), model.predict(train))
+
+
+def test_a_number_comes_back_as_the_number_that_was_saved() -> None:
+    arrays = {"one": np.float64(3.0), "columns": np.asfortranarray(np.arange(6.0).reshape(2, 3))}
+    found = arrays_from_bytes(arrays_to_bytes(arrays))
+    assert {name: array.shape for name, array in found.items()} == {"one": (), "columns": (2, 3)}
+    assert all(np.array_equal(array, arrays[name]) for name, array in found.items())
