@@ -37,7 +37,7 @@ _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)\Z|\.(nan|NaN|NAN)\Z")
 _SURROGATE_ESCAPE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
-def read_yaml(path: Path, as_text: Collection[str] = ()) -> Any:
+def read_yaml(path: Path, as_text: Collection[str] = (), schema: str | None = None) -> Any:
     """The content of a YAML file.
 
     Parameters
@@ -46,6 +46,8 @@ def read_yaml(path: Path, as_text: Collection[str] = ()) -> Any:
         The file, UTF-8.
     as_text
         Keys whose values are names: a serial number 0417 stays the text that was written.
+    schema
+        What it may state as its own, such as ``fogml.twin/1``; ``none`` where it may state none.
     """
     try:
         with path.open("rb") as file:
@@ -58,7 +60,11 @@ def read_yaml(path: Path, as_text: Collection[str] = ()) -> Any:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError(f"{path.name}, line {line}: is no UTF-8 text; save it in UTF-8") from None
-    return parse_yaml(text, path.name, as_text)
+    values = parse_yaml(text, path.name, as_text)
+    stated = values.get("schema", schema) if isinstance(values, dict) else schema
+    if schema is not None and isinstance(stated, str) and stated != schema:
+        raise InputError(f"{path.name}: key 'schema': {schema} was expected (found {quoted(stated)})")
+    return values
 
 
 def parse_yaml(text: str, source: str, as_text: Collection[str] = ()) -> Any:

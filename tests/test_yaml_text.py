@@ -178,3 +178,14 @@ def test_numbers_of_numpy_are_written_as_those_of_python():
     assert parse_yaml(yaml_text(found), "a.yaml") == {"a": 0.1, "b": 3, "c": 0.25, "d": [0.0, 1.0], "e": True}
     with pytest.raises(TypeError, match="no plain value"):
         yaml_text({"a": object()})
+
+
+@pytest.mark.parametrize("schema", ["fogml.twin/1", "none"])
+def test_a_file_of_another_kind_is_told_by_its_schema(tmp_path: Path, schema: str) -> None:
+    path = tmp_path / "steps.yaml"
+    path.write_text("schema: fogml.programme/1\nname: cold\n")
+    with pytest.raises(InputError) as told:
+        read_yaml(path, schema=schema)
+    expected = f"steps.yaml: key 'schema': {schema} was expected (found 'fogml.programme/1')"
+    assert str(told.value) == expected
+    assert read_yaml(path, schema="fogml.programme/1") == read_yaml(path)

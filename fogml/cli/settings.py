@@ -71,7 +71,8 @@ class Settings(Strict):
     @classmethod
     def gather(cls, config: Path | None, flags: Mapping[str, Any]) -> Self:
         """The settings from a YAML file and from flags; a flag that is None or empty is not set."""
-        stated = read_config(config) if config is not None else {}
+        own = cls.model_fields.get("schema_")
+        stated = read_config(config, own.default if own else "none") if config is not None else {}
         # A path in a configuration file may be meant from where the file lies.
         source = config.name if config is not None else "settings"
         for key in [key for key in stated if key in cls.path_keys]:
@@ -198,9 +199,9 @@ def config_file(command: str) -> str:
     return f"{command.replace(' ', '-')}.config.yaml"
 
 
-def read_config(path: Path) -> dict[str, Any]:
-    """The mapping in a YAML file."""
-    values = read_yaml(path)
+def read_config(path: Path, schema: str = "none") -> dict[str, Any]:
+    """The mapping in a YAML file, which may state a schema of its own."""
+    values = read_yaml(path, schema=schema)
     if values is None:
         return {}
     if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):

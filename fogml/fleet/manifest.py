@@ -112,12 +112,8 @@ def _csv_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
 
 
 def _yaml_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
-    values = read_yaml(path, COLUMNS)
+    values = read_yaml(path, COLUMNS, MANIFEST_SCHEMA)
     if isinstance(values, dict):
-        if values.get("schema", MANIFEST_SCHEMA) != MANIFEST_SCHEMA:
-            raise InputError(
-                f"{path.name}: 'schema' is {quoted(values['schema'])}; {MANIFEST_SCHEMA} is understood"
-            )
         values = values.get("units")
     if not isinstance(values, list) or not all(isinstance(row, dict) for row in values):
         raise InputError(f"{path.name}: a list of units was expected, each with {', '.join(COLUMNS)}")

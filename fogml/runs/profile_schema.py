@@ -262,7 +262,7 @@ def load_profile(name_or_path: str | Path) -> ImportProfile:
     if not path.is_file():
         known = known_are(text, profile_names(), "those that ship")
         raise InputError(f"{text}: no such import profile; {known}; or give a YAML file")
-    values = read_yaml(path, NAMES)
+    values = read_yaml(path, NAMES, "fogml.import/1")
     if not isinstance(values, dict):
         raise InputError(f"{path.name}: an import profile must be 'key: value' lines")
     try:

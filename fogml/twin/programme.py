@@ -145,7 +145,7 @@ def load_programme(source: str | Path | Mapping[str, Any] | Sequence[Any]) -> Pr
             f"{text}: no such programme; {did_you_mean(text, programme_names())}give a YAML file or one of "
             f"{', '.join(programme_names())}"
         )
-    return programme_from(read_yaml(path), path.name)
+    return programme_from(read_yaml(path, schema=SCHEMA), path.name)
 
 
 def programme_from(values: Any, source: str = "programme") -> Programme:

@@ -79,7 +79,7 @@ def load_twin(source: str | Path | Mapping[str, Any]) -> Twin:
     if not path.is_file():
         hint = did_you_mean(text, twin_names())
         raise InputError(f"{text}: no such twin; {hint}give a YAML file or one of {', '.join(twin_names())}")
-    return twin_from(read_yaml(path), path.name)
+    return twin_from(read_yaml(path, schema=SCHEMA), path.name)
 
 
 def save_twin(twin: Twin, path: str | Path) -> None:
