@@ -25,8 +25,9 @@ from fogml.runs.csv_header import (
     with_cells_above,
 )
 from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
+from fogml.runs.frames import frames_checked, is_frame
 from fogml.runs.header_spelling import canonical_cells, uncommented, with_units_below
-from fogml.runs.logger_lines import frames_checked, is_frame, mark_of_line_stamps, stamp_apart
+from fogml.runs.logger_lines import mark_of_line_stamps, stamp_apart
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.yaml_text import parse_yaml
 
@@ -69,7 +70,9 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
     rows = [row for row in rows if _is_data(row, width, numeric)]
     marks = marks_of(CsvSource(path), rows, mark or " ")
     layout = [f"line_stamp: {as_yaml(stamp)}"] if stamp is not None else []
-    layout += [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
+    doubt = f"    # GUESS: {marks.doubt.partition(';')[0]}" if marks.doubt else ""
+    is_stated = marks.decimal != "." or doubt
+    layout += [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"{doubt}'] if is_stated else [])
     layout += ["checksum: true"] if has_sums else []
     if encoding not in ("utf-8-sig", "utf-8"):
         doubt = "    # GUESS: are the names right? else cp1251, koi8-r, shift_jis, big5 ..."

@@ -17,6 +17,7 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.arrow_arrays import takes_threads, values_of
 from fogml.errors import InputError, counted, quoted
 from fogml.runs.csv_source import is_binary
+from fogml.runs.frames import frames_checked
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.raw_table import empty_file
 from fogml.runs.stamp_forms import stamp_form
@@ -85,31 +86,6 @@ def plain_lines(content: bytes, layout: TextLayout) -> bytes:
     if layout.line_stamp is not None:
         content = stamp_apart(content.decode(), layout.line_stamp, layout.text_separator).encode()
     return frames_checked(content) if layout.checksum else content
-
-
-_FRAME = re.compile(rb"\$([^$*\n]*)\*([0-9A-Fa-f]{2})[ \t\r]*\Z")
-
-
-def is_frame(line: str) -> bool:
-    """Whether a line ends as a frame of NMEA 0183 does: a ``$``, what is told, a ``*`` and its sum."""
-    return "$" in line and frames_checked(line.encode()) != b"*"
-
-
-def frames_checked(content: bytes) -> bytes:
-    """Lines with a ``$`` without the sum at their end; those whose sum is wrong or lost as ``*`` alone.
-
-    It is the exclusive or of all bytes between ``$`` and ``*`` (NMEA 0183).
-    """
-    sums = np.bitwise_xor.accumulate(np.frombuffer(content, dtype=np.uint8))
-
-    def checked(line: re.Match[bytes]) -> bytes:
-        found = _FRAME.search(line[0])
-        if found is None:
-            return b"*"
-        before, last = (line.start() + place - 1 for place in found.span(1))
-        return line[0][: found.end(1)] if sums[before] ^ sums[last] == int(found[2], 16) else b"*"
-
-    return re.sub(rb"(?m)^.*\$.*$", checked, content)
 
 
 def mark_of_line_stamps(lines: Sequence[str]) -> str | None:
@@ -320,7 +296,14 @@ def _numbers(text: Any, profile: TextLayout) -> Any:
     marks = f"[{'.' if decimal == ',' else ','}'{HIDDEN}\u00a0\u202f]"
     groups = rf"^[-+]?[1-9]\d{{0,2}}({marks}\d{{3}})+({re.escape(decimal)}\d*)?$"
     bare = compute.replace_substring_regex(plain, marks, "")
-    plain = compute.if_else(compute.match_substring_regex(plain, groups), bare, plain)
+    grouped, with_decimals = (
+        compute.match_substring_regex(plain, groups),
+        compute.match_substring(plain, decimal),
+    )
+    if compute.any(with_decimals).as_py():
+        # Beside decimals, 9.850 without any is another program's number.
+        grouped = compute.and_(grouped, with_decimals)
+    plain = compute.if_else(grouped, bare, plain)
     if decimal == ",":
         plain = compute.replace_substring(compute.replace_substring(plain, ".", HIDDEN), ",", ".")
     plain = compute.replace_substring_regex(plain, r"^\+", "")

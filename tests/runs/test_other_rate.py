@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.runs.other_rate import clock_ends
+from fogml.runs.other_rate import clock_ends, is_of_another_rate
 from fogml.runs.reading import read_run
 
 
@@ -76,3 +76,13 @@ def test_units_below_a_header_that_says_others_are_no_row_of_units(tmp_path):
         read_run(tmp_path / "a.csv")
     (tmp_path / "a.csv").write_text(f"time [s],gyro [deg/h]\nsec,°/h\n{rows}")
     assert len(read_run(tmp_path / "a.csv")) == COUNT
+
+
+@pytest.mark.parametrize(
+    ("step", "count", "is_slower"), [(10, 6, True), (2, 30, True), (1, 20, False), (1, 36, False)]
+)
+def test_a_column_that_is_full_until_it_ends_is_of_no_slower_rate(step, count, is_slower):
+    """The last 20 of 60 values stood for the 40 rows behind them."""
+    values = np.full(COUNT, np.nan)
+    values[: step * count : step] = 20.0
+    assert is_of_another_rate(values) is is_slower

@@ -572,7 +572,7 @@ def test_a_thermometer_beside_a_clock_called_t_is_no_clock():
 
 
 def test_a_decimal_comma_among_tabs_is_no_separator(tmp_path):
-    rows = "".join(f"{9 + i % 7},{100 + i}\t{20 + i % 3},{500 + i}\n" for i in range(COUNT))
+    rows = "".join(f"{9 + i % 7},{1000 + i}\t{20 + i % 3},{5000 + i}\n" for i in range(COUNT))
     (tmp_path / "a.txt").write_text(rows)
     draft = draft_profile(tmp_path / "a.txt")
     assert 'separator: tab\ndecimal: ","\n' in draft and "fields: 2\n" in draft
@@ -588,3 +588,11 @@ def test_names_of_a_table_of_campbells_loggers_are_told_with_their_units(tmp_pat
     (run,) = import_recording(tmp_path / "a.dat", load_profile(tmp_path / "p.yaml"))
     np.testing.assert_allclose(run.gyro, np.arange(COUNT) ** 2 % 37 + 0.5)
     np.testing.assert_allclose(run.columns["T"], 25 + np.arange(COUNT) / 8)
+
+
+def test_marks_that_may_be_of_thousands_are_a_guess(tmp_path):
+    rows = "".join(f'{i},"{9 + i % 7},{100 + i}"\n' for i in range(COUNT))
+    (tmp_path / "a.csv").write_text("time [s],gyro [deg/h]\n" + rows)
+    assert """decimal: "."    # GUESS: numbers such as '9,100' are read as 9100""" in draft_profile(
+        tmp_path / "a.csv"
+    )

@@ -375,3 +375,20 @@ join:
     (run,) = import_recording(tmp_path / "run.csv", tmp_path / "profile.yaml")
     # At 07:00 UTC the oven's clock shows 08:00, two hours after its log began.
     np.testing.assert_allclose(run.columns["T_chamber"], 120.0 + np.arange(600) / 60.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("other", ["9.850", "1.009.850"])
+def test_a_mark_of_thousands_without_decimals_beside_decimals_is_no_number(tmp_path, other):
+    """Of a file that two programs wrote: 9.850 beside 9,604 was read as 9850, without a word."""
+    rows = [f"{i};{9 + i % 3},{600 + i};25" for i in range(COUNT)]
+    rows[20] = f"20;{other};25"
+    (tmp_path / "a.csv").write_text("\n".join(["t;w;T", *rows, ""]))
+    text = "columns:\n  time: {source: t, unit: s}\n  gyro: {source: w, unit: deg/h}\n"
+    (tmp_path / "p.yaml").write_text(
+        f'schema: fogml.import/1\ndescription: d\nseparator: semicolon\ndecimal: ","\n{text}'
+    )
+    with pytest.raises(InputError, match=f"line 22, column 'w': '{other}' is no number"):
+        import_recording(tmp_path / "a.csv", load_profile(tmp_path / "p.yaml"))
+    (tmp_path / "a.csv").write_text((tmp_path / "a.csv").read_text().replace(other, "1.009,850"))
+    (run,) = import_recording(tmp_path / "a.csv", load_profile(tmp_path / "p.yaml"))
+    assert run.gyro[20] == 1009.85
