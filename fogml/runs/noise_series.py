@@ -12,7 +12,8 @@ from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.runs.thermometers import thermal_columns
-from fogml.signals import large
+from fogml.runs.transitions import transition_mask
+from fogml.runs.turning import turning
 from fogml.signals.noise_spectrum import Rows, Spectrum, spectrum_of
 
 REGULAR = 0.99
@@ -97,8 +98,6 @@ def _new_rows(values: FloatArray, samples: float) -> IndexArray:
 
 Follows = Callable[[FloatArray], FloatArray]
 
-AT_REST_DEG_S = 1e-3
-"""Table rate under which the table stands [deg/s]."""
 LOST = 1e-3
 """Share of lost samples from which the mean sample interval stands for the median."""
 HOLD_ROWS = 100_000
@@ -125,7 +124,7 @@ class NoiseSeries:
 def series_of(run: Run) -> NoiseSeries:
     segments = stretches_at_rest(run)
     if max((part.stop - part.start for part in segments), default=0) < 3:
-        turns = int(np.count_nonzero(~rows_at_rest(run)))
+        turns = int(np.count_nonzero(turning(run)))
         why = f", and the table turns at {turns} of {len(run)}" if turns else ""
         raise InputError(
             f"{run.name}: too short for an Allan deviation: at least 3 samples without a gap are "
@@ -187,8 +186,8 @@ def _rows_at(time: FloatArray, place: int, follows: Sequence[Follows | None]) ->
 
 def stretches_at_rest(run: Run) -> list[slice]:
     """Stretches, cut down to rows at rest where the table both turns and stands."""
-    at_rest = rows_at_rest(run)
-    if np.all(at_rest) or not np.any(at_rest):
+    moving, at_rest = turning(run), rows_at_rest(run)
+    if np.all(moving) or np.all(at_rest):
         return list(run.stretches)
     edges = np.flatnonzero(at_rest[1:] != at_rest[:-1]) + 1
     bounds = np.union1d(np.concatenate(([0], edges, run.gap_starts)), [len(run)])
@@ -196,8 +195,9 @@ def stretches_at_rest(run: Run) -> list[slice]:
 
 
 def rows_at_rest(run: Run) -> BoolArray:
-    """Where the table stands, shape (n,)."""
-    return large.each(lambda rate: np.abs(rate) < AT_REST_DEG_S, run.rate, kind=bool)
+    """Where the table stands, without what is about changes of its rate, shape (n,)."""
+    moving = turning(run)
+    return ~(moving | transition_mask(run)) if moving.any() else ~moving
 
 
 def sample_interval(run: Run, segments: Sequence[slice]) -> float:
