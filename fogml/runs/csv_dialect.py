@@ -13,7 +13,7 @@ from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.csv_header import fields_of, header_over_lines
 from fogml.runs.csv_source import CsvSource, Marks, csv_source, is_binary, marks_of, number
 from fogml.runs.encodings import encoding_of
-from fogml.runs.header_spelling import DATE_NAMES, MILLISECOND_NAMES
+from fogml.runs.header_spelling import DATE_NAMES, MILLISECOND_NAMES, PARTS_OF_A_SECOND
 from fogml.runs.raw_table import empty_file, wanted_cells
 from fogml.runs.stamp_forms import FRACTION, StampForm
 from fogml.runs.stamps import DECIMALS, MILLISECONDS, Stamps, stamps_of
@@ -248,9 +248,10 @@ def _parts_of_seconds(
     """
     names = {parse_header(cell)[0].lower() for cell in cells[place + 1 : place + 2]}
     texts = [row[place + 1].strip() for row in rows if len(row) >= len(cells) > place + 1]
-    for form, digits in ((MILLISECONDS, 3), (DECIMALS, 0)):
+    is_millisecond, is_part = names <= MILLISECOND_NAMES, all(map(PARTS_OF_A_SECOND.search, names))
+    for form, digits, is_named in ((MILLISECONDS, 3, is_millisecond), (DECIMALS, 0, is_part)):
         fits = [bool(re.fullmatch(form, text)) for text in texts]
-        if fits and fits[0] and 2 * sum(fits) > len(fits) and (not digits or names <= MILLISECOND_NAMES):
+        if is_named and fits and fits[0] and 2 * sum(fits) > len(fits):
             return round(float(texts[0]) * (1e6 if digits else 1e9)), digits
     return None
 

@@ -15,7 +15,7 @@ from fogml.runs.columns import column_spec, conversion, is_accepted
 from fogml.runs.draft_container import container_fields
 from fogml.runs.draft_layout import Field, as_yaml, text_layout
 from fogml.runs.draft_words import AXIS, COUNT, DATE, GYRO, MULTIPLE, NO_OUTPUT, OWN, SET_POINT, TIME, WARM
-from fogml.runs.header_spelling import MILLISECOND_NAMES, face_of
+from fogml.runs.header_spelling import MILLISECOND_NAMES, PARTS_OF_A_SECOND, face_of
 from fogml.runs.opening import opened
 from fogml.runs.possible import digits_of_clock
 from fogml.runs.stamp_forms import stamp_form
@@ -233,8 +233,10 @@ def _clock(left: list[Field]) -> list[str]:
 
 def _holds_parts_of_seconds(one: Field) -> bool:
     """Whether a field holds milliseconds by its name, or decimals behind a point alone."""
-    decimals = [re.fullmatch(DECIMALS, text.strip(' "')) is not None for text in one.first]
-    return bool(decimals) and (one.name.lower() in MILLISECOND_NAMES or all(decimals))
+    if not one.first or not PARTS_OF_A_SECOND.search(one.name):
+        return False
+    decimals = (re.fullmatch(DECIMALS, text.strip(' "')) for text in one.first)
+    return one.name.lower() in MILLISECOND_NAMES or all(decimals)
 
 
 def _is_in_digits(one: Field) -> bool:

@@ -220,3 +220,13 @@ def test_every_german_month_is_its_own(tmp_path):
     texts = [f"1. {name} 2026 00:00:00" for name in names]
     days = np.cumsum([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30])
     np.testing.assert_array_equal(read_run(log(tmp_path / "a.csv", texts)).time, 86400.0 * days)
+
+
+def test_a_gyro_without_zeros_before_the_point_is_no_part_of_a_second(tmp_path):
+    rows = [f"08:00:{i:02d},.{500 + i},20" for i in range(60)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["time,gyro [deg/h],T [degC]", *rows, ""]))
+    (tmp_path / "p.yaml").write_text(draft_profile(path))
+    for run in (read_run(path), *import_recording(path, load_profile(tmp_path / "p.yaml"))):
+        np.testing.assert_array_equal(run.time, np.arange(60))
+        np.testing.assert_allclose(run.gyro, 0.5 + 0.001 * np.arange(60))
