@@ -173,8 +173,11 @@ def test_a_closed_round_states_no_seed_and_hashes_by_a_salt_of_its_own(tmp_path:
         make_round(tmp_path / "a")
 
 
-def test_a_closed_round_is_made_and_scored_by_its_keeper(tmp_path: Path) -> None:
+def test_a_closed_round_is_made_and_scored_by_its_keeper(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The whole command, so some seconds: a unit of each track is drawn."""
+    monkeypatch.setattr("fogml.benchmark.make.secrets.randbits", lambda bits: 2**bits - 59)
     told = make_round(tmp_path / "round", closed=True, drift=1, diagnosis=1, real=False, workers=1)
     assert told["closed"] and told["seed"] is None
     seed = json.loads((tmp_path / "round" / "kept" / "key.json").read_text())["seed"]
