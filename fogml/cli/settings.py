@@ -199,7 +199,7 @@ def config_file(command: str) -> str:
     return f"{command.replace(' ', '-')}.config.yaml"
 
 
-def read_config(path: Path, schema: str = "none") -> dict[str, Any]:
+def read_config(path: Path, schema: str) -> dict[str, Any]:
     """The mapping in a YAML file, which may state a schema of its own."""
     values = read_yaml(path, schema=schema)
     if values is None:

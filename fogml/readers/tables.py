@@ -20,7 +20,6 @@ class Npz(Container):
     def __init__(self, path: str, keys: list[str]) -> None:
         super().__init__()
         self.first: np.datetime64 | None = None
-        self.beside: dict[str, Any] = {}
         with zipfile.ZipFile(path) as archive:
             for member in archive.namelist():
                 with archive.open(member) as file:

@@ -126,7 +126,8 @@ class Exchange(Pictured):
         return same and self.hash == other.hash
 
     def __hash__(self) -> int:
-        return hash((self.name, self.hash))
+        # Without what columns hold: reading all of a long run takes seconds.
+        return hash((self.name, frozenset(self.columns)))
 
     def __getstate__(self) -> dict[str, Any]:
         """Columns and facts alone: what was worked out from them is worked out anew."""

@@ -28,6 +28,7 @@ _MARK_SHARE = 0.49
 _LEAST_SPELLS = 100
 _NOISY_SPELL = 2
 _LOOKED_AT = 100_000
+"""Readings, at most, whose noise is looked at: so many tell it to a percent."""
 
 
 def stuck(run: Run) -> Iterator[Finding]:

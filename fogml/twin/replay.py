@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
-from weakref import WeakKeyDictionary
+from weakref import finalize
 
 import numpy as np
 
@@ -68,7 +68,9 @@ def replay(
     alone.
     """
     twin, run = as_twin(twin), one_run(run)
-    held = _replayers.setdefault(run, {})
+    if id(run) not in _replayers:
+        finalize(run, _replayers.pop, id(run), None)
+    held = _replayers.setdefault(id(run), {})
     replayer = held.get(id(truth))
     if replayer is None or replayer.truth is not truth:
         replayer = held[id(truth)] = Replayer(run, truth)
@@ -294,4 +296,5 @@ class Replayer:
         return replace(given, drives={**given.drives, **field})
 
 
-_replayers: WeakKeyDictionary[Run, dict[int, Replayer]] = WeakKeyDictionary()
+_replayers: dict[int, dict[int, Replayer]] = {}
+"""By the identity of runs that are there: whether another holds the same takes reading all of both."""

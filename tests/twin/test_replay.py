@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -297,3 +299,16 @@ def test_a_truth_that_went_through_a_spreadsheet(tmp_path) -> None:
     (tmp_path / "twice.csv").write_text(f"{cells},T_in [degC]\n0,0,,1,0,25,25\n")
     with pytest.raises(InputError, match="two of its columns have one name"):
         read_truth(tmp_path / "twice.csv")
+
+
+def test_what_is_kept_of_a_replay_is_its_own_run_s_and_goes_with_it():
+    """Equal runs are not sought by what they hold, which would read a long run whole."""
+    run = simulate(["soak at 25 degC for 10 min"], "nominal", sample_s=10.0).run
+    expected = replay("nominal", run)
+    again = Run(run.name, run.columns, run.facts)
+    assert np.array_equal(replay("nominal", again), expected)
+    assert "hash" not in {**vars(run), **vars(again)} and again == run
+    kept = weakref.ref(run)
+    del run
+    gc.collect()
+    assert kept() is None
