@@ -154,7 +154,9 @@ def cause_shares(
         value of i = sum over rows of c_i (2 r - sum_k c_k)
 
     ``c`` are the causes' courses less what the constants would take up of each. Values add up to v of all
-    causes. Known causes are told apart; all others are ``unknown``.
+    causes. Known causes are told apart; all others are ``unknown``. All is whitened, as the fit that the
+    courses come of: a random walk has most of the plain energy and none of a cause, and what they take away
+    of that may be nothing or less.
     """
     scene, least = found.scene, found.setting.priors.reported.least_part
     groups: dict[str, list[Member]] = {}
@@ -164,15 +166,15 @@ def cause_shares(
     if not groups:
         return ()
     rng = np.random.default_rng([seed, len(groups)])
-    courses = _group_courses(found, every, recalibrated, list(groups.values()), rng)
-    values = [shapley_values(recalibrated.left_on(i), c) for i, c in enumerate(courses)]
-    by_run = [v.sum(axis=0) for v in values]
-    whole = np.sum(by_run, axis=0)
+    left = found.field.base.data - found.field.fixed @ recalibrated.posterior.mean
+    values = shapley_values(left, _group_courses(found, every, recalibrated, list(groups.values()), rng))
+    by_run = [values[span] for span in found.setting.spans]
+    whole = values.sum(axis=0)
     parts: list[tuple[str | None, str | None, FloatArray]] = []
     if scene.fitted > 1:
-        parts += [(r.run.name, None, part) for r, part in zip(scene.fit, by_run)]
+        parts += [(r.run.name, None, v.sum(axis=0)) for r, v in zip(scene.fit, by_run)]
     for index, name in enumerate(Regimes.names):
-        inside = [v[r.regime == index].sum(axis=0) for r, v in zip(scene.fit, values)]
+        inside = [v[r.regime == index].sum(axis=0) for r, v in zip(scene.fit, by_run)]
         parts.append((None, name, np.sum(inside, axis=0)))
     shares = _told(groups, whole, None, None)
     for run, regime, part in parts:
@@ -197,17 +199,17 @@ def _group_courses(
     recalibrated: Foretold,
     groups: Sequence[Sequence[Member]],
     rng: np.random.Generator,
-) -> list[FloatArray]:
-    """What each group makes on each fit run beyond the constants: the mean first, then draws.
+) -> FloatArray:
+    """What each group makes on the fit runs beyond the constants, whitened: the mean first, then draws.
 
-    Shape (m, groups, 1 + draws) for each run.
+    Shape (n, groups, 1 + draws).
     """
-    drawn = every.drawn(rng)
-    parts = [
-        np.stack([np.sum([every.part(i, m, drawn) for m in group], axis=0) for group in groups], axis=1)
-        for i in range(found.scene.fitted)
-    ]
-    return beyond_constants(found, recalibrated, parts)
+    field = found.field
+    courses = dict(zip(every.members, field.courses(every.members, every.drawn(rng))))
+    parts = np.stack([np.sum([courses[m] for m in group], axis=0) for group in groups], axis=1)
+    flat = parts.reshape(len(parts), -1)
+    taken = recalibrated.posterior.covariance @ (field.fixed.T @ flat)
+    return np.asarray((flat - field.fixed @ taken).reshape(parts.shape))
 
 
 def beyond_constants(

@@ -192,7 +192,9 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
     recalibrated = Foretold.of(found, ())
     every = Foretold.of(found, likeliest)
     shares = cause_shares(found, judged, every, recalibrated, seed)
-    share = {s.effect: s.share for s in shares if s.run is None and s.regime is None}
+    # Of causes that cancel by a little one has a little more than all.
+    whole = (s for s in shares if s.run is None and s.regime is None)
+    share = {s.effect: min(max(s.share, 0.0), 1.0) for s in whole}
     items = tuple(
         found_cause(found, every, c, p, cards[c.ids[0]], share.get(c.ids[0], 0.0))
         for c, p in zip(judged.causes, told.probabilities)

@@ -120,12 +120,8 @@ class Foretold:
 
     def of_member(self, run: int, member: Member) -> FloatArray:
         """What one member makes on a run [deg/h], shape (m,)."""
-        return self.part(run, member, self.posterior.mean)
-
-    def part(self, run: int, member: Member, coefficients: FloatArray) -> FloatArray:
-        """What one member makes at coefficients of shape (q, ...), shape (m, ...)."""
         at = self.found.field.places(self.members)[self.members.index(member)]
-        return np.asarray(self.design(run)[:, at] @ coefficients[at])
+        return np.asarray(self.design(run)[:, at] @ self.posterior.mean[at])
 
     def drawn(self, rng: np.random.Generator) -> FloatArray:
         """The mean of the coefficients, then draws from their posterior, shape (q, 1 + draws)."""

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fogml.gap.causes import energy, shapley_values
+from fogml.gap.causes import cause_shares, energy, shapley_values
 from fogml.gap.field import Member
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import foreseen
@@ -54,3 +54,41 @@ def test_energy_is_of_what_constants_do_not_take_up():
     every, recalibrated = Foretold.of(found, (member,)), Foretold.of(found, ())
     expected = len(scene.fit[0]) * np.sum((sizes - sizes.mean()) ** 2)
     assert energy(found, every, recalibrated, member) == pytest.approx(expected, rel=0.01)
+
+
+def _play(course, width):
+    held, out = course[0], np.empty(len(course))
+    for i, value in enumerate(course):
+        held = out[i] = min(max(held, value - width), value + width)
+    return out
+
+
+def test_a_cause_has_its_share_where_a_random_walk_has_most_of_the_energy():
+    """Of a hysteresis alone, beside a constant of each run that is none: all, whatever the walk does."""
+    rng, time, noise = np.random.default_rng(5), 60.0 * np.arange(600), NoiseModel(0.002, 0.0, 0.02)
+    twin = TwinModel(load_twin("nominal"))
+    for _ in range(3):
+        runs = []
+        for i, slow in enumerate((2500.0, 4000.0)):
+            course = 25.0 + 30.0 * np.sin(time / slow)
+            gyro = 0.006 * (_play(course, 8.0) - course) + 0.002 * 60.0**0.5 * rng.standard_normal(600)
+            gyro += 0.02 * np.cumsum(rng.standard_normal(600)) / 60.0**0.5
+            runs.append(Run.from_columns(f"r{i}", time=time, gyro=gyro, T=course))
+        held = foreseen(twin, runs, noise, STANDARD).field
+        families, nodes = held.columns.families, held.columns.nodes
+        at = {families[n.family].id: i for i, n in enumerate(nodes) if i in held.at}
+        chosen = (("thermal_hysteresis", 20.0), ("turn_on_bias", 6.0))
+        members = tuple(Member(nodes[at[id]].family, at[id], size) for id, size in chosen)
+        found = SimpleNamespace(
+            field=held,
+            scene=held.setting.scene,
+            setting=held.setting,
+            columns=held.columns,
+            kind=lambda m, named=families: named[m.family].kind,
+        )
+        every, recalibrated = Foretold.of(found, members), Foretold.of(found, ())
+        judged = SimpleNamespace(best=SimpleNamespace(members=members))
+        told = [s for s in cause_shares(found, judged, every, recalibrated, 0) if s.regime is None]
+        assert {s.run for s in told} == {None, "r0", "r1"}
+        for share in told:
+            assert share.share == pytest.approx(float(share.effect == "thermal_hysteresis"), abs=0.15)
