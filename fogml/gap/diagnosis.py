@@ -17,6 +17,7 @@ from fogml.gap.fitted_model import Explained, explained
 from fogml.gap.how_far import Foretold, HeldOut
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
 from fogml.gap.model import AnyModel, TwinModel
+from fogml.gap.noise import not_static
 from fogml.gap.own_simulator import candidates_of
 from fogml.gap.planning.next_run import next_run, rehearse
 from fogml.gap.posterior import Cause, Judgement, doubted
@@ -243,15 +244,18 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
         nearest=nearest,
         shares=shares,
         compensation=compensation_of(found, judged.causes, named),
-        headline=headline(
-            found,
-            unknown,
-            verdict,
-            shown,
-            nearest,
-            far,
-            lies.segments,
-            any(found.kind(m) == "plant" for m in likeliest),
+        headline=(
+            *headline(
+                found,
+                unknown,
+                verdict,
+                shown,
+                nearest,
+                far,
+                lies.segments,
+                any(found.kind(m) == "plant" for m in likeliest),
+            ),
+            *not_static(noise, found.setting.priors.noise),
         ),
     )
 

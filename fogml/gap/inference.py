@@ -50,9 +50,10 @@ def check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -
                     "must be one that the fit has not seen"
                 )
             held[run.hash] = role, run.name
-    if noise is not None and held.get(noise.hash, ("", ""))[0] == "fit":
+    if noise is not None and noise.hash in held:
+        role, _ = held[noise.hash]
         raise InputError(
-            f"{noise.name}: given as a fit run and as the noise run too; give a static run of its own"
+            f"{noise.name}: given as a {role} run and as the noise run too; give a static run of its own"
         )
     units = {run.facts.unit: run.name for run in every if run.facts.unit}
     axes = {run.facts.axis: run.name for run in every if run.facts.axis}

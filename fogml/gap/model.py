@@ -15,6 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.frozen import FrozenMappings
 from fogml.runs.run import Run
 from fogml.twin.nominal import NAMES, UNITS, NominalConstants
 from fogml.twin.quantities import Grade, Quantity
@@ -51,7 +52,7 @@ class NoisePrior:
 
 
 @dataclass(frozen=True)
-class EffectValue:
+class EffectValue(FrozenMappings):
     """An effect with numbers: its amplitude and its shape parameters in the card's units."""
 
     id: str

@@ -22,6 +22,7 @@ from fogml.gap.settings import STANDARD
 from fogml.gap.step_settings import NoiseSettings
 from fogml.gap.unknown import unknown_families
 from fogml.intervals import Z50
+from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.runs.thermometers import leading_temperature
 from fogml.runs.turning import turning
@@ -115,6 +116,21 @@ def prior_of(
     )
     spread = np.hypot(np.minimum(fit.standard_errors, np.log(3.0)), np.log(settings.unit_factor))
     return NoisePrior(fit.model, tuple(np.exp(spread))), f"static run {noise_run.name}"
+
+
+def not_static(noise_run: Run | None, settings: NoiseSettings = STANDARD.noise) -> tuple[str, ...]:
+    """A sentence where temperature moves through a noise run."""
+    if noise_run is None:
+        return ()
+    noise_run = noise_run.without_dropouts
+    warmth = _motion(noise_run, usable_samples(noise_run)[0], settings)
+    moved = 0.0 if warmth is None else float(np.ptp(warmth))
+    if moved < settings.thermal_degc:
+        return ()
+    return (
+        f"{noise_run.name} is no static run: temperature moves by {short(moved, 2)} degC in it, and drift "
+        "that is no straight line in temperature counts as noise, which may hide a gap.",
+    )
 
 
 def _motion(run: Run, usable: BoolArray, settings: NoiseSettings) -> FloatArray | None:

@@ -58,6 +58,9 @@ class NoiseSettings:
         Rows of a static run at most: for its own fit, whose likelihood is exact, and for that of each noise.
     fewest_samples, static_motion_degc
         A static run has as many samples; temperature that moves by more in it is fitted.
+    thermal_degc
+        A noise run in which temperature moves by as much [degC] is said to be no static one: more than a
+        laboratory's day, and what a drift is told from.
     free_deg_h
         Prior standard deviation of a static run's constant and of what goes with its temperature: free.
     smooth, smooth_price
@@ -86,6 +89,7 @@ class NoiseSettings:
     static_rows: int = 1000
     fewest_samples: int = 64
     static_motion_degc: float = 0.05
+    thermal_degc: float = 5.0
     free_deg_h: float = 1e3
     smooth: tuple[str, ...] = ("time_7200", "time_2400", "temperature_25", "past")
     smooth_price: float = 5.0

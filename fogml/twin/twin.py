@@ -20,6 +20,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from fogml.errors import InputError, known_are, quoted
+from fogml.frozen import FrozenMappings
 from fogml.twin.coil import LayeredCoil
 from fogml.twin.effect import Effect, LoggerEffect, NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.noise import NoiseConstants
@@ -47,7 +48,7 @@ NOISE_FACTOR = 3.0
 
 
 @dataclass(frozen=True)
-class EffectSetting:
+class EffectSetting(FrozenMappings):
     """An effect that is on: its amplitude and its shape parameters, in the card's units."""
 
     amplitude: float
@@ -63,7 +64,7 @@ class EffectSetting:
 
 
 @dataclass(frozen=True, eq=False)
-class Twin:
+class Twin(FrozenMappings):
     """A gyro in its chamber, as a simulator. Immutable; ``with_...`` gives a changed one.
 
     Attributes

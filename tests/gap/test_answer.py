@@ -1,5 +1,6 @@
 """Whole answers: nothing where nothing is missing, a twin's wrong size, dropped rows."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -69,6 +70,7 @@ def test_turn_on_bias_closes_beside_a_constant_of_the_held_out_run(tactical):
     assert far.after == pytest.approx(np.std(series.gap_recalibrated), rel=0.05)
     assert np.mean(series.gap_after) == pytest.approx(0.0, abs=0.01) and far.closed > 0.95
     assert "constant of the run's own" in found.headline[-1]
+    assert pickle.loads(pickle.dumps(found)).as_dict() == found.as_dict()
 
 
 def test_a_run_of_another_turn_on_bias_is_within_what_the_twin_draws(tactical):
@@ -171,3 +173,16 @@ def test_a_stretch_that_is_kept_back_is_foretold_with_what_came_before_it():
     assert held.time_s[0] == pytest.approx(0.75 * run.time[-1], abs=200.0)
     (fitted,) = (s for s in found.series if s.role == "fit")
     assert fitted.time_s[-1] < held.time_s[0]
+
+
+def test_a_noise_run_through_which_temperature_moves_is_told(tactical, runs):
+    """Drift that no straight line in temperature holds counts as noise of it, which hides a gap."""
+    static = _simulated(tactical, ["soak at 25 degC for 6 h"], 9)
+    for noise, moves in ((static, False), (_run(tactical, 8), True)):
+        found = diagnose(TwinModel(tactical), runs[:2], noise=noise, plan=False)
+        assert any("no static run" in said for said in found.headline) == moves
+
+
+def test_a_held_out_run_is_no_noise_run(tactical, runs):
+    with pytest.raises(InputError, match="as a held-out run and as the noise run too"):
+        diagnose(TwinModel(tactical), runs[:2], runs[2:3], noise=runs[2])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import pickle
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 
@@ -273,3 +274,12 @@ def test_an_output_of_reversed_sign_is_a_twin_and_comes_back(tmp_path):
     path = tmp_path / "twin.yaml"
     save_twin(Twin(nominal=NominalConstants(e0=-2e6)), path)
     assert load_twin(path).nominal.e0 == -2e6
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda twin: pickle.loads(pickle.dumps(twin))])
+def test_a_twin_is_copied_and_pickled_and_stays_read_only(again):
+    twin = replace(load_twin("tactical"), suspected={"moisture": Suspected(0.3, 0.1, {})})
+    held = again(twin)
+    assert twin_dict(held) == twin_dict(twin)
+    with pytest.raises(TypeError):
+        held.settings["ageing"] = twin.suspected["moisture"]
