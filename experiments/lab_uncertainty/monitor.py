@@ -20,9 +20,9 @@ class Months:
     """Runs of a unit: what moves its figure between them, and what changes with run `onset`.
 
     Deviations between runs: white, flicker, a walk, a season (amplitude, 52 runs a year), and the tails of a
-    Student's t with `freedom`, 0 for normal ones; each run tells its figure with an error of the deviation
-    `error`, stated right. So many `figures` are watched. The change is a step or, per run, a ramp, of the
-    given size either way.
+    Student's t with `freedom`, 0 for normal ones; the eighth run alone is off by `bad_run`; each run tells
+    its figure with an error of the deviation `error`, stated right. So many `figures` are watched. The change
+    is a step or, per run, a ramp, of the given size either way.
     """
 
     white: float = 1.0
@@ -30,6 +30,7 @@ class Months:
     walk: float = 0.0
     season: float = 0.0
     freedom: int = 0
+    bad_run: float = 0.0
     error: float = 0.5
     shape: str = ""
     size: float = 0.0
@@ -45,9 +46,12 @@ CASES = {
     "nothing changes, random walk": Months(walk=0.1),
     "nothing changes, season of amplitude 1": Months(season=1.0),
     "nothing changes, season of amplitude 3": Months(season=3.0),
+    "nothing changes, one run 30 off": Months(bad_run=30.0),
+    "nothing changes, flicker, one run 30 off": Months(flicker=1.0, bad_run=30.0),
     "step of 3": Months(shape="step", size=3.0),
     "step of 6": Months(shape="step", size=6.0),
     "step of 12": Months(shape="step", size=12.0),
+    "step of 12 after one run 30 off": Months(shape="step", size=12.0, bad_run=30.0),
     "step of 12 on flicker": Months(flicker=1.0, shape="step", size=12.0),
     "ramp of 0.5 a run": Months(shape="ramp", size=0.5),
     "ramp of 1 a run": Months(shape="ramp", size=1.0),
@@ -62,6 +66,7 @@ def recorded(months: Months, rng: np.random.Generator) -> tuple[FloatArray, Floa
     level += months.flicker * flicker(rng, RUNS)
     errors = months.error * np.exp(0.3 * rng.standard_normal(RUNS))
     level += errors * rng.standard_normal(RUNS) + rng.normal(0.0, 10.0)
+    level[7] += months.bad_run
     if months.season:
         year = 2.0 * np.pi * np.arange(RUNS) / 52.0
         level += months.season * np.sin(year + rng.uniform(0.0, 2.0 * np.pi))

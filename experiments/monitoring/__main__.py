@@ -39,6 +39,8 @@ UNITS, POOL = 6, 40
 """Simulated units, and runs of each."""
 PIECE_S, PIECE_AVERAGE_S = 60.0, 2.0
 """Length of a piece of the real recording, and its averaging time [s]."""
+BAD_RUN = 7
+"""Index of the run that is off alone, where one is."""
 TURN_ON = 0.01
 """Deviation of the bias from run to run, simulated [deg/h]; the real one's is how well a run tells it."""
 LIMITS = (100.0, 300.0, 1000.0)
@@ -54,6 +56,7 @@ CHANGES = {
     "ageing, 1 deviation a day": ("level", 0.01),
     "slope against temperature": ("temperature_slope", 0.002),
     "noise, half as much again": ("scatter", 1.5),
+    "bias, 10 deviations, after one run 30 off": ("level", 0.1),
 }
 
 
@@ -106,6 +109,8 @@ def month(
         kept[CHANGED_AT:] = [noisy[i] for i in rng.integers(len(noisy), size=RUNS - CHANGED_AT)]
     if figure == "level":
         bias[CHANGED_AT:] += size * (np.arange(RUNS - CHANGED_AT) + 1.0 if "ageing" in kind else 1.0)
+    if "one run 30 off" in kind:
+        bias[BAD_RUN] += 30.0 * spread
     turned = np.arange(RUNS) >= CHANGED_AT
     return [
         replace(
@@ -209,7 +214,8 @@ def page(found: Mapping[str, list[dict]]) -> str:
         *_changed_table(change),
         "",
         "A step of the bias by 3 deviations is what flicker brings now and then: it is found late or not at "
-        "all. Size and run are those of the first alarm, as the runs since tell it.",
+        "all. Size and run are those of the first alarm, as the runs since tell it. "
+        "The run that is off is the eighth; it is told as one that is off alone, and hides no step.",
         "",
         "## Where the bias is known not to wander (`--no-wander`)",
         "",

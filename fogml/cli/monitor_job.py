@@ -137,7 +137,13 @@ def _models(place: Path) -> Callable[[Run], DriftModel]:
 
 
 def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.monitor_words import alarm_words, calibration_words, state_words, unit_label
+    from fogml.report.monitor_words import (
+        alarm_words,
+        calibration_words,
+        outlier_words,
+        state_words,
+        unit_label,
+    )
 
     # Those that changed come first: of many units not all are shown.
     units = sorted(
@@ -165,7 +171,8 @@ def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
     for unit in shown:
         label = unit_label(unit)
         calibration = "" if unit["alarms"] else calibration_words(unit)
-        for text in (*map(alarm_words, unit["alarms"]), calibration, *unit["notes"]):
+        outliers = map(outlier_words, unit["outliers"])
+        for text in (*map(alarm_words, unit["alarms"]), calibration, *outliers, *unit["notes"]):
             if text:
                 terminal.say(f"{label}: {text}")
     if len(units) > len(shown):

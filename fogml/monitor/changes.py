@@ -25,6 +25,10 @@ After an alarm the evidence begins anew with the last of the runs that the chang
 figure that changed may go on: without a further change its mean is constant, or follows a line over the age
 (n - 2 for n - 1), as likely. A ramp that goes on raises no alarm, one that ends does.
 
+A run that is off alone is no change. The evidence of it is that of a change that ends with the run it begins
+with; once that of one run passes A, with those that followed, and is greater than that of all changes, the
+figure counts as not told by this run: a normal distribution would take its scatter for the usual.
+
 An alarm stands as it was raised. What changed, how and since when is told anew with every run that follows up
 to the next change: two runs hardly tell a step from a ramp.
 """
@@ -87,6 +91,29 @@ class Change:
 
 
 @dataclass(frozen=True)
+class Outlier:
+    """A run that a figure is off in alone, and left out of what is usual.
+
+    Attributes
+    ----------
+    index
+        Index of the run.
+    told_at
+        Index of the run with which it was told.
+    figure
+        The figure that is off.
+    size, size_ci90
+        By how much, in the figure's unit: median and interval as it was told.
+    """
+
+    index: int
+    told_at: int
+    figure: str
+    size: float
+    size_ci90: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Chart:
     """The evidence of change after each of n runs, and the alarms that it raised.
 
@@ -98,11 +125,20 @@ class Chart:
         The alarms, in order.
     begins
         Index of the run that the last evidence begins with.
+    outliers
+        Runs that a figure is off in alone, in the order in which they were told.
     """
 
     statistic: FloatArray
     changes: tuple[Change, ...]
     begins: int = 0
+    outliers: tuple[Outlier, ...] = ()
+
+    def usual(self, name: str, values: FloatArray) -> FloatArray:
+        """A figure's values with NaN for the runs that it is off in alone, shape (n,)."""
+        values = np.array(values)
+        values[[one.index for one in self.outliers if one.figure == name]] = np.nan
+        return values
 
 
 def change_chart(
@@ -153,22 +189,24 @@ def change_chart(
     if not runs_between_false_alarms >= 1.0:
         raise InputError(f"{runs_between_false_alarms} runs between false alarms: at least 1 is needed")
     statistic = np.zeros(len(age))
+    told = {name: np.array(values, dtype=np.float64) for name, values in figures.items()}
 
-    def evidence(first: int, stop: int, moved: frozenset[str]) -> dict[str, FigureEvidence]:
+    def evidence(first: int, stop: int, moved: frozenset[str], *names: str) -> dict[str, FigureEvidence]:
         """Of runs from `first` on, `stop` left out, where some figures may go along a line."""
         return {
             name: FigureEvidence(
-                values[:stop],
+                told[name][:stop],
                 age[:stop],
                 first,
                 prior,
                 _until((errors or {}).get(name), stop),
                 moves=name in moved,
             )
-            for name, values in figures.items()
+            for name in names or told
         }
 
     raised: list[tuple[int, frozenset[str], Change]] = []
+    outliers: list[Outlier] = []
     first = place = 0
     moved: frozenset[str] = frozenset()
     stop = _FEW_RUNS
@@ -177,6 +215,12 @@ def change_chart(
         charts = evidence(first, stop, moved)
         while place < min(stop, len(age)):
             logs, statistic[place] = _statistic(charts, place)
+            off = _outlier(charts, place, max(statistic[place], runs_between_false_alarms))
+            if off:
+                outliers.append(off)
+                told[off.figure][off.index] = np.nan
+                charts |= evidence(first, stop, moved, off.figure)
+                continue
             place += 1
             if statistic[place - 1] >= runs_between_false_alarms:
                 change = _change(charts, logs, place - 1, statistic[place - 1])
@@ -194,10 +238,11 @@ def change_chart(
         if end > change.raised_at + 1:
             charts = evidence(begin, end, lines)
             logs, latest = _statistic(charts, end - 1)
-            told = _change(charts, logs, change.raised_at, change.statistic)
-            change = replace(told, latest_statistic=latest)
+            if logs:
+                since = _change(charts, logs, change.raised_at, change.statistic)
+                change = replace(since, latest_statistic=latest)
         changes.append(replace(change, off_course=change.figure in lines))
-    return Chart(statistic, tuple(changes), first)
+    return Chart(statistic, tuple(changes), first, tuple(outliers))
 
 
 def _statistic(charts: Mapping[str, FigureEvidence], place: int) -> tuple[dict[str, FloatArray], float]:
@@ -207,6 +252,18 @@ def _statistic(charts: Mapping[str, FigureEvidence], place: int) -> tuple[dict[s
     logs = {name: one.logs - np.log(len(charts)) for name, one in charts.items() if len(one.logs)}
     total = np.logaddexp.reduce([part for one in logs.values() for part in one.ravel()] or [-np.inf])
     return logs, float(np.exp(min(total, 700.0)))
+
+
+def _outlier(charts: Mapping[str, FigureEvidence], place: int, limit: float) -> Outlier | None:
+    """The run that a figure is most likely off in alone, where the evidence of it passes the limit."""
+    name = max(charts, key=lambda name: charts[name].alone.max(initial=-np.inf), default=None)
+    if name is None or not len(alone := charts[name].alone):
+        return None
+    told = int(np.argmax(alone))
+    if not alone[told] - np.log(len(charts)) >= np.log(limit):
+        return None
+    median, *ends = charts[name].off_quantiles((0.5, *TAILS), told)
+    return Outlier(charts[name].run(told), place, name, median, (ends[0], ends[1]))
 
 
 def _until(values: FloatArray | None, stop: int) -> FloatArray | None:

@@ -7,18 +7,19 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.special import gammaln
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.monitor.marginal import about_usual, gain, marginal
 from fogml.settings_check import check_numbers
 from fogml.signals.distributions import students_ppf
 from fogml.signals.noise_model import flicker_ladder
 
 Shape = Literal["step", "ramp"]
 SHAPES: tuple[Shape, ...] = ("step", "ramp")
+_KINDS = 1 + len(SHAPES)
+"""What is judged of each run: whether it alone is off, and the changes that may begin with it."""
 
-
-_ROWS = 256
+_ROWS = 128
 """Runs that are judged at once: few, so that the tables of all onsets stay small."""
 
 
@@ -32,8 +33,8 @@ class ChangePrior:
         Runs before the first that a change can begin with: a deviation needs two, and with three its
         estimate is no longer off by orders of magnitude.
     sizes
-        Deviations that a step's size may have, in deviations of the figure between runs; equally likely. In
-        octaves from what hides between runs to what nobody overlooks.
+        Deviations that a step's size may have, or what a run alone is off by, in deviations of the figure
+        between runs; equally likely. In octaves from what hides between runs to what nobody overlooks.
     ramp_sizes
         The same of what a ramp adds in the mean interval between the baseline's runs.
     between
@@ -104,6 +105,8 @@ class FigureEvidence:
     logs
         Log evidence by onset (each told run after the baseline that enough have followed) and shape, shape
         (m, 2); (0, 2) before.
+    alone
+        Log evidence that a run alone is off, by told run that enough have followed, shape (k,).
     """
 
     def __init__(
@@ -124,6 +127,7 @@ class FigureEvidence:
         self._unconfirmed = prior.confirming_runs - 1
         self._done = 0
         self.logs: FloatArray = np.empty((0, len(SHAPES)))
+        self.alone: FloatArray = np.empty(0)
         n = len(self._rows)
         if n <= self._baseline:
             return
@@ -135,7 +139,7 @@ class FigureEvidence:
         interval = (self._age[start - 1] - self._age[0]) / (start - 1)
         self._t = (self._age - self._age[0]) / interval if interval > 0.0 else np.arange(float(n))
         self._usual = np.column_stack((np.ones(n), self._t))
-        self._sizes = np.square(np.array([prior.sizes, prior.ramp_sizes]))
+        self._sizes = np.square(np.array([prior.sizes, prior.sizes, prior.ramp_sizes]))
         own = None if errors is None else np.square(errors[self._rows])
         between = np.array(prior.between)
         if own is None or not np.all(own[:start] > 0.0):
@@ -161,10 +165,12 @@ class FigureEvidence:
         return solve_triangular(root, columns, lower=True), np.cumsum(np.log(np.diag(root)))
 
     def _columns(self) -> FloatArray:
-        """What changes add to each run, shape (n, 2 m): onset by onset a step and a ramp."""
-        onsets = np.arange(self._baseline, len(self._y), dtype=np.intp)
-        shapes = [self._shape(onsets, s) for s in range(len(SHAPES))]
-        return np.stack(shapes, axis=-1).reshape(len(self._y), -1)
+        """What each run adds to all: itself alone, a step and a ramp from it on; shape (n, 3 n)."""
+        n = len(self._y)
+        onsets = np.arange(n, dtype=np.intp)
+        # No change begins with the first runs.
+        changes = [self._shape(onsets, s) * (onsets >= self._baseline) for s in range(len(SHAPES))]
+        return np.stack([np.eye(n), *changes], axis=-1).reshape(n, -1)
 
     def _judge(self) -> None:
         """Log evidence by the first 1 to n told runs; covariance by covariance, as all take much room."""
@@ -174,9 +180,9 @@ class FigureEvidence:
         with np.errstate(divide="ignore", invalid="ignore"):
             for model, width in enumerate(self._widths):
                 z, log_dets = self._whitened(model, known[:, : 1 + width])
-                _, volume, _, about = _about(z)
+                _, volume, _, about = about_usual(z)
                 least = np.minimum(least, about)
-                plain[model] = _marginal(log_dets + volume, about, np.maximum(count - width, 0.5))
+                plain[model] = marginal(log_dets + volume, about, np.maximum(count - width, 0.5))
         silent = ~(least > count * np.maximum.accumulate(self._least))
         plain[:, silent] = 0.0
         # Constants and lines are as likely from the first runs on.
@@ -185,19 +191,19 @@ class FigureEvidence:
         weights = plain - self._shift[:, None]
         weights -= np.logaddexp.reduce(weights)
         columns = self._columns()
-        sizes = np.tile(self._sizes, (n - start, 1))
-        valid = np.repeat(np.arange(start, n), len(SHAPES))
+        sizes = np.tile(self._sizes, (n, 1))
+        valid = np.repeat(np.arange(n), _KINDS)
         self._all = np.full(columns.shape, -np.inf)
         for model, width in enumerate(self._widths):
             z, _ = self._whitened(model, np.column_stack((known[:, : 1 + width], columns)))
-            turn, _, along, about = _about(z[:, : 1 + width])
-            about[silent], sums = 1.0, np.zeros((2 + width, columns.shape[1]))
+            turn, _, along, about = about_usual(z[:, : 1 + width])
+            about[silent] = 1.0
+            sums = np.sum(_products(z[:start], width), axis=1)
             for first in range(start, n, _ROWS):
                 rows = slice(first, min(first + _ROWS, n))
-                # Changes that begin later add nothing yet.
-                begun = slice(0, len(SHAPES) * (rows.stop - start))
-                part = z[rows, 1 + width :][:, begun]
-                products = np.stack([part**2, *(part * z[rows, i, None] for i in range(1 + width))])
+                # What begins later adds nothing yet.
+                begun = slice(0, _KINDS * rows.stop)
+                products = _products(z[rows, : 1 + width + begun.stop], width)
                 products = sums[:, None, begun] + np.cumsum(products, axis=1)
                 sums[:, begun] = products[:, -1]
                 of_usual = np.einsum("nij,jnm->inm", turn[rows], products[2:])
@@ -207,10 +213,10 @@ class FigureEvidence:
                 freedom = 0.5 * (count[rows, None] - width)
                 later = count[rows, None] <= valid[begun]
                 for size in sizes.T:
-                    ratios = weights[model, rows, None] + _gain(size[begun], v, explained, freedom)
+                    ratios = weights[model, rows, None] + gain(size[begun], v, explained, freedom)
                     ratios[later] = -np.inf
                     self._all[rows, begun] = np.logaddexp(self._all[rows, begun], ratios)
-        self._all -= np.log(self._sizes.size)
+        self._all -= np.log(len(sizes.T))
         self._all[silent] = -np.inf
 
     def _shape(self, onsets: IndexArray, shape: int) -> FloatArray:
@@ -222,28 +228,42 @@ class FigureEvidence:
     def go_to(self, place: int) -> None:
         """Take the runs up to and with index `place`."""
         self._done = int(np.searchsorted(self._rows, place, side="right"))
-        onsets = self._done - self._baseline - self._unconfirmed
-        if onsets > 0:
-            known = slice(0, len(SHAPES) * onsets)
-            logs = self._all[self._done - 1, known]
+        onsets = self._done - self._unconfirmed
+        if onsets > self._baseline:
+            known = slice(0, _KINDS * onsets)
+            logs = self._all[self._done - 1, known].reshape(-1, _KINDS)
             before = self._all[self._done - 1 - self._unconfirmed : self._done - 1, known]
+            self.alone, logs = logs[:, 0], logs[self._baseline :, 1:] - np.log(len(SHAPES))
             if len(before):
-                logs = np.where(before.min(axis=0) > 0.0, logs, np.minimum(logs, 0.0))
-            self.logs = logs.reshape(-1, len(SHAPES))
+                before = before.min(axis=0).reshape(-1, _KINDS)[self._baseline :, 1:] - np.log(len(SHAPES))
+                logs = np.where(before > 0.0, logs, np.minimum(logs, 0.0))
+            self.logs = logs
 
     def onset(self, change: int) -> int:
         """Index of the run that a change begins with."""
         return int(self._rows[self._baseline + change])
 
+    def run(self, told: int) -> int:
+        """Index of a told run."""
+        return int(self._rows[told])
+
+    def off_quantiles(self, levels: tuple[float, ...], told: int) -> list[float]:
+        """Quantiles of what a told run alone is off by."""
+        return self._quantiles(levels, np.eye(len(self._y))[:, [told]], self._sizes[0])
+
     def size_quantiles(self, levels: tuple[float, ...], shape: int) -> list[float]:
         """Quantiles of a change's size: for each covariance and each onset by least squares, weighed."""
+        onsets = np.arange(self._baseline, self._done - self._unconfirmed)
+        found = self._quantiles(levels, self._shape(onsets, shape), self._sizes[1 + shape])
+        age, t = self._age[: self._done], self._t[: self._done]
+        unit = float(np.ptp(age) / np.ptp(t)) if shape == 1 and np.ptp(age) > 0.0 else 1.0
+        return [value / unit for value in found]
+
+    def _quantiles(
+        self, levels: tuple[float, ...], columns: FloatArray, sizes_before: FloatArray
+    ) -> list[float]:
+        """Of the size of one of some columns."""
         n = self._done
-        onsets = np.arange(self._baseline, n - self._unconfirmed)
-        columns = self._shape(onsets, shape)
-        if shape == 1 and np.ptp(self._age[:n]) > 0.0:
-            unit = float(np.ptp(self._age[:n]) / np.ptp(self._t[:n]))
-        else:
-            unit = 1.0
         parts = []
         for model, width in enumerate(self._widths):
             free = n - float(width)
@@ -261,10 +281,9 @@ class FigureEvidence:
             v, products = v[told], y @ x[:, told]
             sizes = products / v
             residual = np.maximum(about - products * sizes, 0.0)
-            sizes_before = self._sizes[shape][:, None]
-            logs = np.logaddexp.reduce(_gain(sizes_before, v, products**2 / about, 0.5 * free))
+            logs = np.logaddexp.reduce(gain(sizes_before[:, None], v, products**2 / about, 0.5 * free))
             volume = float(np.sum(np.log(np.abs(np.diag(upper)))))
-            plain = _marginal(log_dets[n - 1] + volume, about, free) - self._shift[model]
+            plain = marginal(log_dets[n - 1] + volume, about, free) - self._shift[model]
             scales = np.sqrt(residual / (free - 1.0) / v)
             parts.append((logs + plain, sizes, scales, np.full_like(sizes, free - 1.0)))
         if not parts:
@@ -275,51 +294,10 @@ class FigureEvidence:
         kept = shares > 1e-12
         shares = shares[kept] / shares[kept].sum()
         found = students_ppf(levels, shares, sizes[kept], scales[kept], freedom[kept])
-        return [float(value) / unit for value in found]
+        return [float(value) for value in found]
 
 
-def _gain(size: FloatArray, v: FloatArray, explained: FloatArray, freedom: FloatArray | float) -> FloatArray:
-    """Log evidence that a column adds: squares `v` beside the mean, of size before the data, and the share of
-    the values' squares over `v` that it explains."""
-    wide = 1.0 + size * v
-    # Rounding aside, what a column explains is less than all.
-    gained = np.minimum(size * explained / wide, 1.0 - 1e-15)
-    return np.asarray(-0.5 * np.log(wide) - freedom * np.log1p(-gained))
-
-
-def _marginal(log_volume: FloatArray, about: FloatArray | float, freedom: FloatArray | float) -> FloatArray:
-    """Log likelihood of squares about what is usual, its constants and the deviation integrated out."""
-    half = 0.5 * freedom
-    return np.asarray(gammaln(half) - log_volume - half * np.log(np.pi * about))
-
-
-def _about(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Of whitened values and the columns of what is usual, one or two, run by run.
-
-    Returns
-    -------
-    turn
-        What makes sums of products with the columns orthonormal, shape (n, columns, columns).
-    volume
-        Logarithm of what the columns span, shape (n,).
-    along
-        Products of the values with the orthonormal columns, shape (n, columns).
-    about
-        Squares of what the values are beside the columns, shape (n,).
-    """
-    y, usual = z[:, 0], z[:, 1:]
-    width = usual.shape[1]
-    products = np.cumsum(usual[:, :, None] * z[:, None, :], axis=0)
-    turn = np.zeros((len(z), width, width))
-    turn[:, 0, 0] = 1.0 / np.sqrt(products[:, 0, 1])
-    if width == 2:
-        share = products[:, 0, 2] / products[:, 0, 1]
-        rest = products[:, 1, 2] - share * products[:, 0, 2]
-        # A line through one run, or through runs of one age, is none.
-        told = rest > 1e-12 * products[:, 1, 2]
-        turn[told, 1, 1] = 1.0 / np.sqrt(rest[told])
-        turn[:, 1, 0] = -share * turn[:, 1, 1]
-    sizes = np.diagonal(turn, axis1=1, axis2=2)
-    volume = -np.sum(np.log(np.where(sizes > 0.0, sizes, 1.0)), axis=1)
-    along = np.einsum("nij,nj->ni", turn, products[:, :, 0])
-    return turn, volume, along, np.cumsum(y**2) - np.sum(along**2, axis=1)
+def _products(z: FloatArray, width: int) -> FloatArray:
+    """Of whitened [values, what is usual, columns]: each column by itself, the values and what is usual."""
+    columns = z[:, 1 + width :]
+    return np.stack([columns**2, *(columns * z[:, i, None] for i in range(1 + width))])

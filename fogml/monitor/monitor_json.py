@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.monitor.changes import Change
+from fogml.monitor.changes import Change, Outlier
 from fogml.monitor.record import FIGURES
 from fogml.monitor.watch import NEAREST, Calibration, UnitWatch
 
@@ -63,6 +63,7 @@ def _unit(unit: UnitWatch, limit: float) -> dict[str, Any]:
             _alarm(unit, change, unit.chart.changes[place:], limit)
             for place, change in enumerate(unit.chart.changes, start=1)
         ],
+        "outliers": [_outlier(unit, outlier) for outlier in unit.chart.outliers],
         "calibration": None if unit.calibration is None else _calibration(unit.calibration),
         "notes": list(unit.notes),
     }
@@ -92,6 +93,18 @@ def _alarm(unit: UnitWatch, change: Change, later: Sequence[Change], limit: floa
         "size_ci90": list(change.size_ci90),
         "unit": FIGURES[change.figure] + per,
         "nearest": list(NEAREST[change.figure, change.shape]),
+    }
+
+
+def _outlier(unit: UnitWatch, outlier: Outlier) -> dict[str, Any]:
+    return {
+        "run": unit.records[outlier.index].run,
+        "index": outlier.index,
+        "told_at": unit.records[outlier.told_at].run,
+        "figure": outlier.figure,
+        "size": outlier.size,
+        "size_ci90": list(outlier.size_ci90),
+        "unit": FIGURES[outlier.figure],
     }
 
 

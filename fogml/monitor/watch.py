@@ -221,7 +221,9 @@ def _watched(
         dated=dated,
         chart=chart,
         state=state,
-        calibration=_calibration(age[first:], figures["level"][first:], limit, any(prior.wander))
+        calibration=_calibration(
+            age[first:], chart.usual("level", figures["level"])[first:], limit, any(prior.wander)
+        )
         if dated
         else None,
         notes=tuple(notes),

@@ -48,13 +48,10 @@ def onset_words(alarm: Mapping[str, Any]) -> str:
 def alarm_words(alarm: Mapping[str, Any]) -> str:
     """An alarm in a few sentences."""
     figure = FIGURE_WORDS[alarm["figure"]]
-    size, (low, high) = alarm["size"], alarm["size_ci90"]
-    how = f"moves by {number(size)} {alarm['unit']} (90 %: {_interval(low, high)})"
     if alarm["figure"] == "scatter" and alarm["shape"] == "step":
-        factors = [math.exp(min(value, 50.0)) for value in (size, low, high)]
-        how = f"is {number(factors[0])} times what it was (90 %: {_interval(*factors[1:])})"
-    elif alarm["shape"] == "ramp":
-        how = f"drifts by {number(size)} {alarm['unit']} (90 %: {_interval(low, high)})"
+        how = f"is {_size(alarm)}"
+    else:
+        how = f"{'drifts' if alarm['shape'] == 'ramp' else 'moves'} by {_size(alarm)}"
     if alarm["off_course"]:
         how += " off its course of the runs before"
     first, last = alarm["onset_ci90"]
@@ -65,6 +62,24 @@ def alarm_words(alarm: Mapping[str, Any]) -> str:
         f"The {figure} {how} since {onset_words(alarm)} ({alarm['onset']}{between}); noticed with "
         f"{alarm['raised_at']}.{further} Effects that do so: {', '.join(alarm['nearest'])}."
     )
+
+
+def outlier_words(outlier: Mapping[str, Any]) -> str:
+    """A run that a figure is off in alone, in a sentence."""
+    figure, by = FIGURE_WORDS[outlier["figure"]], "" if outlier["figure"] == "scatter" else "off by "
+    return (
+        f"The {figure} of {outlier['run']} alone is {by}{_size(outlier)}: no change, as the runs up to "
+        f"{outlier['told_at']} tell, and does not count for what is usual. Look for what was wrong with it."
+    )
+
+
+def _size(told: Mapping[str, Any]) -> str:
+    """A size with its interval; the scatter's, a logarithm, as a factor where it is no ramp's."""
+    values = [told["size"], *told["size_ci90"]]
+    if told["figure"] == "scatter" and told.get("shape") != "ramp":
+        values = [math.exp(min(value, 50.0)) for value in values]
+        return f"{number(values[0])} times the usual (90 %: {_interval(*values[1:])})"
+    return f"{number(values[0])} {told['unit']} (90 %: {_interval(*values[1:])})"
 
 
 def calibration_words(unit: Mapping[str, Any]) -> str:
@@ -136,6 +151,10 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
             figure.update_yaxes(**log_axis(min(seen), max(seen)), row=row, col=1)
         if name == "level":
             style.floor_lines(figure, unit["runs"][-1]["half_width"], row)
+        off = [one["index"] for one in unit["outliers"] if one["figure"] == name]
+        if off:
+            crosses = [age[i] for i in off], [values[i] for i in off]
+            figure.add_trace(style.points(*crosses, None, style.VERMILION, "x", 13, **style.SILENT), row, 1)
         for alarm in unit["alarms"]:
             if alarm["figure"] == name:
                 figure.add_vline(
@@ -152,8 +171,8 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
         alt=f"Figures of {plural(len(age), 'run')}. {'Changed: ' + changes if changes else 'No change'}.",
         caption=(
             "What the model leaves on each run; bars: how well the run tells it, 90 %. Red line: where a "
-            "change began; red circle: the run that it was noticed with. Dashed: the model's 90 % interval "
-            "for averages."
+            "change began; red circle: the run that it was noticed with; red cross: a run that is off alone, "
+            "which does not count for what is usual. Dashed: the model's 90 % interval for averages."
         ),
     )
 

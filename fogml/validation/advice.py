@@ -16,6 +16,7 @@ from fogml.validation.reasons import (
     Reason,
     gained_reasons,
     implausible_reasons,
+    opposite_reasons,
     reversed_reasons,
     saturated_reason,
     still_reason,
@@ -148,6 +149,7 @@ def output_reasons(judgement: Judgement, asked: Asked | None = None) -> Iterator
 def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
     yield from output_reasons(judgement, asked)
     yield from unit_reasons(judgement.train, judgement.test)
+    yield from opposite_reasons(judgement.train)
     yield from _not_judged(judgement)
     yield from _one_way(judgement)
     yield from _one_temperature(judgement)

@@ -126,6 +126,62 @@ def reversed_reasons(run: RunJudgement, *, steadier: float = 2.0) -> Iterator[Re
         )
 
 
+def opposite_reasons(train: Sequence[RunJudgement], *, steadier: float = 2.0) -> Iterator[Reason]:
+    """What speaks against a model that was trained on runs of which one has the other sign.
+
+    What a cubic in temperature with its rate makes of one run leaves of another one, added to it, half as
+    much as that moves by, or less (1 / `steadier`), and each of the other: one of the two is reversed, that
+    which is so beside more of the others.
+    """
+    pairs = [
+        (a, b)
+        for a, b in combinations(train, 2)
+        if all(
+            moves > steadier * max(run.floor, left)
+            for run, (moves, left) in ((b, _with_course_of(a, b)), (a, _with_course_of(b, a)))
+        )
+    ]
+    if not pairs:
+        return
+    counts = {run.run: sum(run in pair for pair in pairs) for run in train}
+    most = [name for name, count in counts.items() if count == max(counts.values())]
+    if len(most) == 1:
+        (who,) = most
+        what = f"the output of {who} seems to be reversed"
+        how = f"What {who} does over temperature, the other training runs do with the other sign"
+    else:
+        who = " or ".join(sorted({run.run for run in pairs[0]}))
+        what = f"{' and '.join(run.run for run in pairs[0])} seem to be of opposite signs"
+        how = "What one of these training runs does over temperature, the other does with the other sign"
+    yield Reason(
+        "do_not_use",
+        what,
+        f"{how}, so that what they teach cancels: was the axis turned over, or the sign changed on the way?",
+        f"Put the sign of {who} right, and train again.",
+    )
+
+
+def _with_course_of(one: RunJudgement, other: RunJudgement) -> tuple[float, float]:
+    """What the output of `other` moves by, and with the course of `one` over temperature added [deg/h].
+
+    By the averages at temperatures and rates that both have.
+    """
+    points = [np.array([run.series.temperature, run.series.rate]) for run in (one, other)]
+    low = np.max([values.min(axis=1) for values in points], axis=0)[:, None]
+    high = np.min([values.max(axis=1) for values in points], axis=0)[:, None]
+    scale = np.where(high > low, high - low, 1.0)
+    tables, outputs = [], []
+    for run, values in zip((one, other), points, strict=True):
+        within = np.all((values >= low) & (values <= high), axis=0)
+        t, rate = (values[:, within] - low) / scale
+        tables.append(np.column_stack([np.ones(len(t)), t, t**2, t**3, rate, t * rate]))
+        outputs.append(run.series.before[within])
+    if min(map(len, outputs)) <= 2 * tables[0].shape[1]:
+        return 0.0, 0.0
+    course = tables[1] @ np.linalg.lstsq(tables[0], outputs[0], rcond=None)[0]
+    return float(np.std(outputs[1])), float(np.std(outputs[1] + course))
+
+
 def gained_reasons(run: RunJudgement) -> Iterator[Reason]:
     """What a run says for or against the model by how much it takes away there."""
     before, after = run.before.rms, run.after.rms

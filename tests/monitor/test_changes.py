@@ -62,6 +62,56 @@ def test_the_statistic_is_the_sum_of_ratios_of_marginal_likelihoods(ages):
         assert chart.statistic[n - 1] == pytest.approx(np.sum(np.exp(logs)) / 2.0, rel=1e-6)
 
 
+def test_that_a_run_alone_is_off_is_a_ratio_of_marginal_likelihoods():
+    y, t = np.random.default_rng(3).normal(size=8), np.arange(8.0)
+    y[1] += 8.0
+    prior = ChangePrior(sizes=(3.0,), ramp_sizes=(0.5,), wander=(0.0, 0.5))
+    told = FigureEvidence(y, t, 0, prior, None)
+    told.go_to(6)
+    covariances = [np.eye(7) + q * flicker_covariance(t[:7], prior.longest_wander) for q in (0.0, 0.5)]
+
+    def likelihood(run, size):
+        return sum(_marginal(y[:7], np.eye(7)[run], size, c) for c in covariances)
+
+    ratios = [likelihood(run, 3.0) / likelihood(run, 0.0) for run in range(6)]  # nothing confirms the last
+    np.testing.assert_allclose(np.exp(told.alone), ratios, rtol=1e-6)
+    assert np.argmax(told.alone) == 1
+
+
+@pytest.mark.parametrize("bad", [1, 7])
+def test_a_bad_run_is_told_and_hides_no_later_change(bad):
+    """As usual scatter it hid steps a third as large in most units."""
+    ages, seen, held = np.arange(30.0), [], []
+    for seed in range(6):
+        rng = np.random.default_rng([11, seed])
+        errors = 0.5 * np.exp(0.3 * rng.normal(size=30))
+        level = np.hypot(1.0, errors) * rng.normal(size=30) + 10.0 * (ages >= 20.0)
+        level[bad] += 30.0
+        chart = change_chart(
+            {"level": level, "other": rng.normal(size=30)}, ages, 300.0, errors={"level": errors}
+        )
+        outlier, *_ = chart.outliers
+        assert (outlier.figure, outlier.index) == ("level", bad) and bad < outlier.told_at < 15
+        held.append(outlier.size_ci90[0] <= 30.0 <= outlier.size_ci90[1])
+        assert np.flatnonzero(np.isnan(chart.usual("level", level))).tolist() == [bad]
+        seen += [change.raised_at for change in chart.changes]
+    assert sum(place in (21, 22) for place in seen) >= 5 and len(seen) <= 7
+    assert sum(held) >= 4
+
+
+def test_a_step_is_no_run_alone_and_normal_runs_are_none():
+    alone = 0
+    for seed in range(15):
+        level = np.random.default_rng([12, seed]).normal(size=30)
+        alone += len(change_chart({"level": level}, np.arange(30.0), 300.0).outliers)
+        level[15:] += 8.0
+        chart = change_chart({"level": level}, np.arange(30.0), 300.0)
+        assert chart.changes[0].onset == 15
+        alone += len(chart.outliers)
+    # Stated: 3 in 30 times 30 runs at most, in the mean.
+    assert alone <= 3
+
+
 def test_after_a_change_constants_and_lines_are_as_likely_from_the_first_runs_on():
     t = np.array([0.0, 1.0, 2.0, 3.0, 4.5, 5.0, 6.5])
     y = 0.3 * t + np.random.default_rng(3).normal(size=7)

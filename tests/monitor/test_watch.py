@@ -11,7 +11,7 @@ import pytest
 from fogml.monitor.monitor_json import monitor_json
 from fogml.monitor.watch import watch
 from fogml.report.monitor_page import monitor_page, unit_file, unit_page
-from fogml.report.monitor_words import alarm_words, calibration_words
+from fogml.report.monitor_words import alarm_words, calibration_words, outlier_words
 from tests.monitor.test_store import RECORD
 
 
@@ -68,6 +68,25 @@ def test_a_drift_that_goes_on_says_so_and_its_end_is_told_off_its_course():
     assert "goes on" not in alarm_words(first) and "off its course" not in alarm_words(first)
     assert "off its course" in alarm_words(last)
     assert last["size_ci90"][0] < -0.03 < last["size_ci90"][1]
+
+
+def test_a_run_that_is_off_alone_is_said_drawn_and_left_out_of_the_trend():
+    records = service(20)
+    records[6] = replace(records[6], level=records[6].level + 0.3, scatter=-2.0)
+    values = values_of(watch(records))
+    (unit,) = values["units"]
+    assert unit["state"] == "steady" and not unit["alarms"]
+    told = {one["figure"]: one for one in unit["outliers"]}
+    assert sorted(told) == ["level", "scatter"] and {one["run"] for one in told.values()} == {"06.csv"}
+    assert told["level"]["size_ci90"][0] < 0.3 < told["level"]["size_ci90"][1]
+    assert outlier_words(told["level"]).startswith("The bias of 06.csv alone is off by 0.3")
+    assert "is 7." in outlier_words(told["scatter"]) and "times the usual" in outlier_words(told["scatter"])
+    page = unit_page(unit, 1000.0)
+    assert outlier_words(told["level"]) in page
+    without, _ = (values_of(watch(some))["units"] for some in (records[:6] + records[7:], records))
+    assert unit["calibration"]["trend_ci90"] == pytest.approx(
+        without[0]["calibration"]["trend_ci90"], rel=1e-9
+    )
 
 
 def test_units_are_kept_apart():

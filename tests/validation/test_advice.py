@@ -275,3 +275,40 @@ def test_a_run_of_the_other_sign_is_told_where_its_drift_shows(
     runs = [Run(name, {"time": time, "gyro": gyro, "T": warm}) for name, gyro in zip("ab", (trained, judged))]
     advice = advice_on(judge(make_model("polynomial", "T").fit(runs[0]), *runs))
     assert ("reversed" in advice.brief) == told
+
+
+@pytest.mark.parametrize(
+    ("signs", "told"),
+    [
+        ((1.0, 1.0), ""),
+        ((1.0, -1.0), "a and b seem to be of opposite signs"),
+        ((1.0, -1.0, 1.0), "the output of b seems to be reversed"),
+        ((-1.0, 1.0, 1.0, 1.0), "the output of a seems to be reversed"),
+        ((1.0, 1.0, 1.0), ""),
+    ],
+)
+def test_a_training_run_of_the_other_sign_is_told(signs: tuple[float, ...], told: str) -> None:
+    """What they teach cancels: the model is merely worse, and a test run shows no reversed course."""
+    rng, time = np.random.default_rng(2), 10.0 * np.arange(1500)
+    runs = []
+    for name, sign in zip("abcd", signs, strict=False):
+        warm = 20.0 - 30.0 * np.cos(time / 2400.0 + rng.uniform(0.0, 6.0)) + rng.normal(0.0, 3.0)
+        rate = 60.0 * np.gradient(warm, time)
+        drift = 5.0 + 0.05 * warm - 2e-4 * warm**2 + 0.3 * rate
+        runs.append(Run(name, {"time": time, "gyro": sign * drift + rng.normal(0.0, 0.05, 1500), "T": warm}))
+    model = make_model("polynomial", "T, dT").fit(runs)
+    advice = advice_on(judge(model, runs, [runs[-1]]))
+    assert told in advice.brief
+    assert any("cancels" in reason for reason in advice.reasons) == bool(told)
+
+
+@pytest.mark.parametrize(("slope", "noise"), [(0.0, 0.05), (0.002, 0.5)])
+def test_runs_that_share_no_course_are_of_no_sign(slope: float, noise: float) -> None:
+    rng, time = np.random.default_rng(3), 10.0 * np.arange(1500)
+    warm = 20.0 - 30.0 * np.cos(time / 2400.0)
+    runs = [
+        Run(name, {"time": time, "gyro": sign * slope * warm + rng.normal(0.0, noise, 1500), "T": warm})
+        for name, sign in (("a", 1.0), ("b", -1.0))
+    ]
+    judged = judge(make_model("polynomial", "T").fit(runs), runs, [runs[0]])
+    assert not any("cancels" in reason for reason in advice_on(judged).reasons)
