@@ -90,8 +90,13 @@ def number(value: float | None, digits: int = 3) -> str:
     exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if exponent < -4 or exponent >= 7:
         mantissa, power = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa} × 10{str(int(power)).translate(_RAISED)}".replace("-", "−")
+        return f"{mantissa} × {power_of_ten(int(power))}".replace("-", "−")
     return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
+
+
+def power_of_ten(power: int) -> str:
+    """A power of ten with its raised exponent: ``10⁻⁵``."""
+    return f"10{str(power).translate(_RAISED)}"
 
 
 def to_error(value: float, error: float | None, most: int = 4) -> str:

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from fogml.arrays import FloatArray
 from fogml.escaping import figure_text, markup
+from fogml.numerals import power_of_ten
 from fogml.signals.drawn import drawn
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 8.0, 8.0, 34.0
@@ -190,7 +191,13 @@ def _width(label: str) -> float:
 def _labelled(values: Sequence[float]) -> dict[float, str]:
     """Ticks with their labels, of as many digits as tell them apart, six at least."""
     digits = next((d for d in range(6, 12) if len({f"{v:.{d}g}" for v in values}) == len(values)), 12)
-    return {value: f"{value + 0.0:.{digits}g}".replace("-", "−") for value in values}
+    return {value: _in_powers(f"{value + 0.0:.{digits}g}").replace("-", "−") for value in values}
+
+
+def _in_powers(label: str) -> str:
+    """A label with its power of ten as pages write it."""
+    mantissa, _, power = label.partition("e")
+    return f"{mantissa} × {power_of_ten(int(power))}".removeprefix("1 × ") if power else label
 
 
 _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])

@@ -108,7 +108,6 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
         figure.add_trace(trace, row, column)
         for end in (mean - 2 * std, mean + 2 * std):
             figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=column)
-        figure.update_yaxes(tickformat=".3~g", row=row, col=column)
     serial_axis(figure, labels, most=16)
     for row in range(1, rows):
         figure.update_xaxes(title_text="", row=row)

@@ -182,8 +182,8 @@ def region_figure(values: Mapping[str, Any]) -> Drawing | None:
     figure.add_trace(style.line(outline[:, 0], outline[:, 1], words, style.BLUE, 1.4, **filled))
     there = [values["delta_x_deg"]], [values["delta_y_deg"]]
     figure.add_trace(style.points(*there, "four states", style.BLUE, "cross", 11))
-    figure.update_xaxes(title_text="misalignment x [deg]", tickformat=".6~g", nticks=5)
-    figure.update_yaxes(title_text="misalignment y [deg]", tickformat=".6~g")
+    figure.update_xaxes(title_text="misalignment x [deg]", nticks=5)
+    figure.update_yaxes(title_text="misalignment y [deg]")
     style.styled(figure, 420)
     long, short = region["half_axes_deg"]
     return Drawing(

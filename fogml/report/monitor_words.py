@@ -127,8 +127,8 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
     told = told or ["level"]
     titles = [f"{FIGURE_WORDS[n].replace('slope against the', 'slope,')}<br>[{_UNITS[n]}]" for n in told]
     axis, age = _age_axis(unit), unit["age"]
-    looks = {"title_font_size": 11, "tickformat": ".3~g"}
-    figure = style.stacked(dict.fromkeys(titles, 1.0), axis["title_text"], 0.16 / len(told), **looks)
+    heights = dict.fromkeys(titles, 1.0)
+    figure = style.stacked(heights, axis["title_text"], 0.16 / len(told), title_font_size=11)
     figure.update_xaxes(**axis, row=len(told), col=1)
     for row, name in enumerate(told, start=1):
         values = [shown_figure(run, name) for run in unit["runs"]]
@@ -235,7 +235,7 @@ def levels(units: Sequence[Mapping[str, Any]]) -> Drawing:
         looks = {"thickness": 1, "width": 2, "color": style.TRAINING}
         figure.add_trace(style.points(x, y, name, colour, symbol, 10, error_y={**bars, **looks}))
     serial_axis(figure, labels)
-    figure.update_yaxes(title_text="bias left by the model [deg/h]", tickformat=".3~g")
+    figure.update_yaxes(title_text="bias left by the model [deg/h]")
     style.styled(figure, 380)
     changed = sum(unit["state"] == "alarm" for unit in units)
     return Drawing(

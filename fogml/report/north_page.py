@@ -197,7 +197,7 @@ def error_by_azimuth(values: Mapping[str, Any]) -> Drawing | None:
     at = float(np.interp(here, azimuth, error, period=360.0))
     figure.add_trace(style.points([here], [at], "this seek", style.VERMILION, "diamond-open", 12, 2))
     figure.update_xaxes(title_text="azimuth [deg clockwise from north]", range=[0, 360], dtick=45)
-    figure.update_yaxes(title_text="error of the azimuth [deg]", tickformat=".3~g")
+    figure.update_yaxes(title_text="error of the azimuth [deg]")
     style.styled(figure, 400)
     places = " and ".join(f"{a:.1f}" for a in quiet)
     zero = f"; it is nothing at {places} deg" if quiet else ""

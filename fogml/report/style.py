@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 from plotly.subplots import make_subplots
 
-from fogml.numerals import short
+from fogml.numerals import power_of_ten, short
 from fogml.signals.drawn import gap_starts
 
 # Okabe and Ito's palette, distinct under the common colour deficiencies
@@ -81,6 +81,9 @@ def _axis() -> dict[str, Any]:
         "zeroline": False,
         "automargin": True,
         "title": {"standoff": 8},
+        # Plotly's own prefixes (k, M, B for 10⁹, µ) read as part of the unit.
+        "exponentformat": "power",
+        "minexponent": 5,
     }
 
 
@@ -263,7 +266,7 @@ def _plain(value: float) -> str:
     if -4 <= power <= 4:
         return np.format_float_positional(value, trim="-")
     mantissa = f"{short(value / 10.0**power, 2)}·"
-    return f"{'' if mantissa == '1·' else mantissa}10<sup>{power}</sup>".replace("-", "−")
+    return f"{'' if mantissa == '1·' else mantissa}{power_of_ten(power)}"
 
 
 Segment = tuple[str, float, float]

@@ -65,8 +65,9 @@ def implausible_reasons(run: RunJudgement) -> Iterator[Reason]:
             yield Reason(
                 "use_with_care",
                 f"{told} of {run.run} can't be as stated",
-                f"{run.run}: {finding.message}. If it is wrong, so is every figure here, and what the model "
-                "makes of another run.",
+                f"{run.run}: {finding.message}.".replace("?.", "?")
+                + " If it is wrong, so is every figure here, "
+                "and what the model makes of another run.",
                 f"Put {told} of {run.run} right, or make sure of it, and train and judge again.",
             )
 

@@ -9,10 +9,12 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+import plotly.graph_objects as go
 import pytest
 
 from fogml.numerals import number
-from fogml.report import page
+from fogml.report import page, style
 from fogml.report.certificate import certificate
 from tests.report.chromium import _SCREEN, CHROMIUM, Browser, Opened
 from tests.report.judgements import judgement
@@ -72,6 +74,34 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str]
 
     yield open_html
     one.close()
+
+
+TICKS = "[...document.querySelectorAll('.ytick text, .xtick text')].map(tick => tick.textContent)"
+
+
+@pytest.mark.parametrize(
+    ("values", "axis"),
+    [
+        (np.linspace(1234.5, 1234.501, 9), {}),
+        (np.linspace(-1e8, 5e8, 9), {}),
+        (np.linspace(0.0, 2e-8, 9), {}),
+        (np.geomspace(2e-7, 3e-5, 9), style.log_axis(2e-7, 3e-5)),
+        (np.geomspace(1e7, 1e9, 9), style.log_axis(1e7, 1e9)),
+    ],
+)
+def test_ticks_tell_values_apart_in_plain_numbers(browser, values, axis) -> None:
+    figure = go.Figure(style.line(values, values, None, style.BLUE, 1.0))
+    figure.update_yaxes(**axis)
+    drawing = page.Drawing(style.styled(figure.update_xaxes(**axis), 300), alt="")
+    template = page._environment().from_string(
+        '{% extends "base.html" %}{% block content %}{{ draw(drawing) }}{% endblock %}'
+    )
+    opened = browser(page.render(template, title="Ticks", drawing=drawing))
+    told = opened.tell(TICKS)
+    opened.close()
+    assert len(set(told)) > 2
+    assert max(map(told.count, told)) == 2, told  # once on either axis
+    assert not [tick for tick in told if re.search("[<>a-zA-Zµ]", tick)], told
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -212,6 +212,13 @@ def test_the_small_figure_of_a_constant_is_drawn() -> None:
     assert "nan" not in svg
 
 
+def test_labels_beyond_six_digits_are_powers_of_ten_as_pages_write_them() -> None:
+    svg = line_figure([Curve(np.arange(2.0), np.array([0.0, 2e6]), "#000000")], "x", "y", "large")
+    assert {"0", "10⁶", "2 × 10⁶"} == set(re.findall('text-anchor="end">([^<]+)<', svg))
+    svg = line_figure([Curve(np.arange(2.0), np.array([-2e-5, 2e-5]), "#000000")], "x", "y", "small")
+    assert {"−2 × 10⁻⁵", "0", "2 × 10⁻⁵"} == set(re.findall('text-anchor="end">([^<]+)<', svg))
+
+
 def test_labels_of_a_small_span_far_from_zero_are_told_apart() -> None:
     """A rate of 123456.6 to 123457.2 deg/h: labels differ, and each is the value at its height."""
     y = np.array([123456.6, 123457.2])

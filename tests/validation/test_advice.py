@@ -127,6 +127,12 @@ def test_each_reason_alone_decides(make: Callable[[], Judgement], grade: str, br
     assert found.next_step
 
 
+def test_a_reason_that_asks_ends_with_its_question() -> None:
+    asking = replace(SIGN, message="is its sign wrong?")
+    (reason, *_) = advice_on(trained_on(asking)).reasons
+    assert "is its sign wrong? If it is" in reason
+
+
 def beside(times: float) -> Judgement:
     """A judgement beside another model that leaves so many times as much."""
     base = replace(judgement(), design_index=None, limits=())
