@@ -63,7 +63,6 @@ SILENT: dict[str, Any] = {"showlegend": False, "hoverinfo": "skip"}
 """Of a trace that neither the legend nor the pointer names."""
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', Arial, sans-serif"
-_INK = "#1F2328"
 _GRID = "#E4E7EB"
 _AXIS_LINE = "#9AA1AA"
 
@@ -81,15 +80,14 @@ def _axis() -> dict[str, Any]:
         "zeroline": False,
         "automargin": True,
         "title": {"standoff": 8},
-        # Plotly's own prefixes (k, M, B for 10⁹, µ) read as part of the unit.
-        "exponentformat": "power",
+        "exponentformat": "power",  # plotly's own prefixes (k, B for 10⁹, µ) read as part of the unit
         "minexponent": 5,
     }
 
 
 TEMPLATE = go.layout.Template(
     layout={
-        "font": {"family": FONT, "size": 13, "color": _INK},
+        "font": {"family": FONT, "size": 13, "color": "#1F2328"},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
         "colorway": list(SERIES),
