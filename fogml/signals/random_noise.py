@@ -174,13 +174,12 @@ def bursts(
     series = np.zeros(count)
     number = int(rng.binomial(count, min(probability, 1.0)))
     starts = np.sort(rng.integers(0, max(count, 1), number))
-    lengths = rng.geometric(1.0 / max(mean_length, 1.0), number)
+    # Of a burst that outlasts the series only what lies within is worked out.
+    lengths = np.minimum(rng.geometric(1.0 / max(mean_length, 1.0), number), count - starts)
     sizes = deviation * rng.standard_normal(number)
     which = np.repeat(np.arange(number), lengths)
     within = np.arange(len(which)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    rows = starts[which] + within
-    inside = rows < count
-    np.add.at(series, rows[inside], sizes[which[inside]])
+    np.add.at(series, starts[which] + within, sizes[which])
     return series
 
 

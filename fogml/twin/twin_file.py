@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -40,8 +41,12 @@ from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.twin/1"
 TWIN_FOLDER = Path(__file__).parent / "twins"
-_FACTORS = {("s", "min"): 60.0, ("s", "h"): 3600.0, ("m", "km"): 1e3, ("m", "mm"): 1e-3, ("m", "nm"): 1e-9}
-"""Of a documented unit and another one that is understood."""
+_OTHER_UNITS = {
+    "s": {"min": 60.0, "h": 3600.0, "d": 86400.0},
+    "m": {"km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
+}
+"""By a documented unit: others that are understood, in it."""
+_PER_KELVIN = re.compile(r"(?<=[/(])K(?![A-Za-z])")
 
 
 def twin_names() -> tuple[str, ...]:
@@ -124,7 +129,7 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
                 **_values(source, "surroundings", stated.surroundings, SURROUNDING_QUANTITIES)
             ),
             settings={id: _setting(source, id, entry) for id, entry in stated.effects.items()},
-            uncertainty=_uncertainty(stated.uncertainty),
+            uncertainty=_uncertainty(stated),
             suspected={id: _suspected(source, id, entry) for id, entry in stated.suspected.items()},
         )
         # Raises where plant and effects don't fit together.
@@ -229,13 +234,26 @@ def _sensors(source: str, stated: Any) -> Sensors:
 
 
 def _uncertainty(stated: Any) -> Uncertainty | None:
-    if stated is None:
+    told = stated.uncertainty
+    if told is None:
         return None
-    rows = stated.covariance
+    rows, names = told.covariance, tuple(told.parameters)
     if any(len(row) != len(rows) for row in rows):
         raise InputError("uncertainty: rows of the covariance are of different lengths")
     matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(rows))
-    return Uncertainty(tuple(stated.parameters), matrix, stated.source)
+    found = Uncertainty(names, matrix, told.source)
+    # Rows and columns are in the units in which the file states the values.
+    factors = np.array([_stated_factor(name, stated) for name in names])
+    return replace(found, covariance=found.covariance * np.outer(factors, factors))
+
+
+def _stated_factor(name: str, stated: Any) -> float:
+    """Of the unit that a file states a parameter in to the documented one."""
+    held = stated
+    for key in name.split("."):
+        held = held.get(key) if isinstance(held, Mapping) else getattr(held, key, None)
+    unit = held.unit if isinstance(held, Stated) else None
+    return next((others[unit] for others in _OTHER_UNITS.values() if unit in others), 1.0)
 
 
 def _suspected(source: str, id: str, entry: Mapping[str, Stated]) -> Suspected:
@@ -271,8 +289,8 @@ def _values(source: str, section: str, stated: Any, quantities: Iterable[Quantit
 
 
 def _value(source: str, key: str, held: Stated, quantity: Quantity) -> float:
-    unit = held.unit.replace("°", "deg") if held.unit else quantity.unit
-    factor = 1.0 if unit == quantity.unit else _FACTORS.get((quantity.unit, unit))
+    unit = _PER_KELVIN.sub("degC", held.unit.replace("°", "deg")) if held.unit else quantity.unit
+    factor = 1.0 if unit == quantity.unit else _OTHER_UNITS.get(quantity.unit, {}).get(unit)
     if factor is None:
         raise InputError(f"{source}: key '{key}' has unit '{held.unit}'; {quantity.unit} is needed")
     low, high = quantity.limits

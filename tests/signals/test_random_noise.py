@@ -149,6 +149,13 @@ def test_lines_are_means_over_the_samples(frequency: float) -> None:
     assert random_noise.sinusoid(40, 0.7, 2.0, frequency, 0.4) == pytest.approx(2.0 * wanted, abs=2e-6)
 
 
+def test_bursts_that_outlast_the_series_take_no_more_than_it_is_long():
+    """A thousand frames that stick for good, of 8 GB of samples if all were held."""
+    series = random_noise.bursts(rng(8), 1000, 1.0, 1.0, 1e6)
+    assert np.isfinite(series).all()
+    assert 0.0 < np.mean(np.diff(series) != 0.0) < 0.9
+
+
 def test_bursts_have_their_rate_length_and_size() -> None:
     series = random_noise.bursts(rng(8), 1_000_000, 5.0, 1e-3, 4.0)
     held = np.flatnonzero(series)

@@ -43,6 +43,24 @@ def test_a_file_reads_back_as_the_same_twin(tmp_path):
     np.testing.assert_allclose(back.uncertainty.covariance, COVARIANCE)
 
 
+def test_a_covariance_is_in_the_units_in_which_the_file_states_the_values():
+    """Variances of 4 min2, 0.25 h2 and 1 ppm2/K2: deviations of 120 s, 1800 s and 1 ppm/degC."""
+    values = {
+        "schema": "fogml.twin/1",
+        "nominal": {"k1": {"value": 3.0, "unit": "ppm/K"}},
+        "plant": {"case": {"value": 15.0, "unit": "min"}, "heating": {"steady": 2.0}},
+        "effects": {"ageing": {"amplitude": 0.1, "time_constant": {"value": 4.0, "unit": "h"}}},
+        "uncertainty": {
+            "parameters": ["plant.case", "effects.ageing.time_constant", "nominal.k1", "plant.coil"],
+            "covariance": [[4.0, 0.5, 0, 0], [0.5, 0.25, 0, 0], [0, 0, 1.0, 0], [0, 0, 0, 9.0]],
+        },
+    }
+    told = load_twin(values).uncertainty
+    assert told is not None
+    np.testing.assert_allclose(np.sqrt(np.diag(told.covariance)), [120.0, 1800.0, 1.0, 3.0])
+    assert told.covariance[0, 1] == pytest.approx(0.5 * 60.0 * 3600.0)
+
+
 def test_drawn_units_scatter_as_the_covariance_says():
     twin = unsure()
     drawn = [drawn_twin(twin, 3, number) for number in range(1, 801)]
