@@ -13,7 +13,16 @@ from fogml.gap.frame import whitener_of
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.posterior import Judgement
-from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Onset, Unknown, Verdict
+from fogml.gap.result import (
+    CandidateEvidence,
+    ConstantFit,
+    Found,
+    NoiseReport,
+    Onset,
+    Unknown,
+    Verdict,
+    in_doubt,
+)
 from fogml.gap.result_parts import GapSegment, HowFar, Nearest, RunSeries, beyond_noise
 from fogml.gap.where import averages
 from fogml.numerals import percent, probability_words, short
@@ -219,6 +228,12 @@ def headline(
         said.append(
             "Heat flows a little otherwise than the model's plant says, or a sensor lags: fit its time "
             f"constants. Nothing beyond that is missing that {could}"
+        )
+    elif verdict == "no_gap" and (doubt := in_doubt(verdict, shown, unknown)) is not None:
+        said.append(
+            f"Nothing is sure enough to be named, and that nothing is missing is not sure: "
+            f"{titles[doubt.effect].title} is {probability_words(doubt.probability)} probable, something "
+            f"unknown {probability_words(unknown.probability)}{f'; {out}' if out else ''}."
         )
     elif verdict == "no_gap":
         said.append(f"Nothing is missing that {could}")

@@ -50,10 +50,7 @@ class RunAmplitude:
 
 @dataclass(frozen=True)
 class Onset:
-    """Since when an effect acts: the run, the time on its clock [s], and what that explains more [nats].
-
-    ``amplitude`` is its size since then: that of all runs is a mean.
-    """
+    """Since when an effect acts: run, time on its clock [s], what that explains more [nats], size since."""
 
     run: str
     time_s: float
@@ -136,6 +133,14 @@ class Unknown:
     looks_like: str
 
 
+def in_doubt(verdict: Verdict, found: Sequence[Found], unknown: Unknown) -> Found | None:
+    """The likeliest cause where nothing is named, and something acts more likely than not."""
+    likeliest = max(found, key=lambda f: f.probability, default=None)
+    if likeliest is None or verdict != "no_gap":
+        return None
+    return likeliest if likeliest.probability + unknown.probability >= NAMED else None
+
+
 @dataclass(frozen=True)
 class SeparatingRun:
     """The programme that tells a class's members apart, or shows what runs so far could not.
@@ -214,7 +219,7 @@ class Diagnosis(Pictured):
     found
         Effects with some probability, the most certain first.
     suspected
-        Effects that are more likely than not, and not sure enough to be named.
+        Effects of an unknown gap that are not sure enough to be named.
     unknown
         What no candidate explains.
     where, how_far

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fogml.gap.result import Diagnosis
+from fogml.gap.result import Diagnosis, in_doubt
 from fogml.gap.result_parts import WORSE, beyond_noise
 from fogml.numerals import MISSING, listed, number, percent, plural, probability_words
 from fogml.report.gap_words import (
@@ -30,7 +30,8 @@ def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
     """Verdict, cause, confidence, what is unknown, and what is closed."""
     kind = {"explained": "met", "no_gap": "met", "unknown": "missed", "partly_explained": "words missed"}
     told = "missed" if does_not_close(found) else kind.get(found.verdict, "")
-    if found.verdict == "no_gap" and beyond_noise(found.how_far):
+    doubt = in_doubt(found.verdict, found.found, found.unknown)
+    if doubt is not None or (found.verdict == "no_gap" and beyond_noise(found.how_far)):
         told = ""
     tiles = [Tile("Verdict", verdict_words(found), "", _verdict_note(found), told)]
     tiles += [_cause_tile(found, names), _confidence_tile(found, names)]
@@ -44,6 +45,8 @@ def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
 def _verdict_note(found: Diagnosis) -> str:
     if does_not_close(found):
         return "and the gap does not close"
+    if in_doubt(found.verdict, found.found, found.unknown) is not None:
+        return "not for certain"
     out = beyond_noise(found.how_far)
     return {
         "no_gap": "in the fitted runs; held out, more is left" if out else "within the noise",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fogml.gap.result import Diagnosis, Estimate, Found
+from fogml.gap.result import Diagnosis, Estimate, Found, in_doubt
 from fogml.gap.result_parts import HowFar, beyond_noise
 from fogml.numerals import (
     averages,
@@ -76,9 +76,8 @@ def headline(found: Diagnosis) -> str:
     if run := does_not_close(found):
         return f"Named, and the gap does not close on {run}: {causes}"
     match found.verdict:
-        case "no_gap" if found.suspected:
-            causes = " + ".join(cause_words(f, names) for f in found.suspected)
-            return f"No gap for certain; suspected: {causes}"
+        case "no_gap" if doubt := in_doubt(found.verdict, found.found, found.unknown):
+            return f"No gap for certain; suspected: {cause_words(doubt, names)}"
         case "no_gap" if out := beyond_noise(found.how_far):
             return f"No cause stands out of the fitted runs; {out}"
         case "no_gap":
@@ -137,6 +136,12 @@ def _first(found: Diagnosis, names: dict[str, str]) -> str:
             else ""
         )
         where = " of the fitted runs" if beyond_noise(found.how_far) else ""
+        if in_doubt(found.verdict, found.found, found.unknown):
+            return (
+                f"With its own constants fitted the twin leaves nothing that surely stands out of the noise"
+                f"{where}, and none of {among} is named; that nothing is missing is not sure either.{most} "
+                f"Something unknown acts with {probability_words(found.unknown.probability)}."
+            )
         return (
             f"With its own constants fitted the twin leaves nothing that stands out of the noise{where}: "
             f"none of {among} is named.{most}"

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fogml.gap.reports import headline
 from fogml.gap.result import HowFar
 from fogml.gap.result_parts import Where, beyond_noise
 from fogml.numerals import MISSING, probability_words, unit_words, with_error
@@ -64,16 +65,13 @@ def test_a_gap_without_a_sure_cause_names_the_likeliest() -> None:
     assert effect(likeliest.effect).title in first
 
 
-@pytest.mark.parametrize("verdict", ["unknown", "no_gap"])
-def test_what_is_suspected_is_told_with_its_probability_and_is_no_name(verdict: str) -> None:
-    found = every_diagnosis()[verdict]
+def test_what_is_suspected_is_told_with_its_probability_and_is_no_name() -> None:
+    found = every_diagnosis()["unknown"]
     suspected = replace(every_diagnosis()["explained"].found[0], probability=0.72)
     first = tiles(Page(gap_page(replace(found, suspected=(suspected,)))))
     title = effect(suspected.effect).title
     assert f"Suspected, and not sure enough to be named: {title} (72 %)" in first
-    assert "Missing from the twin" not in first and "Suspected" not in tiles(page(verdict))
-    if verdict == "no_gap":
-        assert f"No gap for certain; suspected: {title}" in first and "agree within the noise" not in first
+    assert "Missing from the twin" not in first and "Suspected" not in tiles(page("unknown"))
 
 
 def test_the_table_of_causes_marks_what_is_suspected_and_highlights_names_alone() -> None:
@@ -236,6 +234,22 @@ def test_no_gap_is_not_said_of_held_out_runs_that_stand_out_of_noise(
     assert said in first and beyond_noise((far,)) in first
     assert ("agree within the noise" in first) == (not said)
     assert ("No cause stands out of the fitted runs" in first) == bool(said)
+
+
+@pytest.mark.parametrize(("probability", "unknown", "sure"), [(0.46, 0.29, False), (0.06, 0.05, True)])
+def test_no_gap_is_said_for_certain_where_nothing_is_likelier_than_something(
+    probability, unknown, sure
+) -> None:
+    cause = replace(hysteresis(), probability=probability)
+    held = every_diagnosis()["no_gap"]
+    found = replace(held, found=(cause,), unknown=replace(held.unknown, probability=unknown))
+    first = tiles(Page(gap_page(found)))
+    assert ("agree within the noise" in first) == sure
+    assert ("No gap for certain; suspected: Thermal hysteresis of the bias" in first) == (not sure)
+    assert ("not for certain" in first) == (not sure)
+    scene = SimpleNamespace(candidates=effects(), runs=[], in_time=[])
+    said = headline(SimpleNamespace(scene=scene), found.unknown, "no_gap", found.found, (), (), (), False)
+    assert said[0].startswith("Nothing is missing" if sure else "Nothing is sure enough to be named")
 
 
 def test_of_several_held_out_runs_the_worst_is_told() -> None:
