@@ -285,7 +285,8 @@ def check_feature_text(text: str) -> None:
 
 def resolve_features(features: str | Features, runs: Sequence[Run]) -> Features:
     """Features of one's own from their text, terms with ``{sensor}`` written out for the runs' sensors."""
-    resolved = parse_features(written_out(features if isinstance(features, str) else features.text, runs))
+    text = features.text if isinstance(features, Features) else features
+    resolved = parse_features(written_out(text, runs) if isinstance(text, str) else text)
     for run in runs:
         check_holds(run, resolved.sensors, resolved.text)
     check_suits(resolved, runs)

@@ -64,7 +64,7 @@ def predicted(regressor: Any, columns: FloatArray) -> FloatArray:
     Raises
     ------
     InputError
-        If it can't be applied to them, or gives no finite number for each.
+        If it can't be applied to them, or gives no number for each; infinite ones are told where used.
     """
     with asked(regressor, "can't be applied to these runs"):
         found = np.asarray(regressor.predict(read_only(columns)))

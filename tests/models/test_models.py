@@ -269,3 +269,9 @@ def test_a_feature_too_large_to_be_squared_is_refused(train, name, text):
     run = train.with_columns(power=1e17 + 0.0 * train.time)
     with pytest.raises(InputError, match=r"feature \S+ is as large as 1e\d+ in the training runs"):
         make_model(name, text).fit(run)
+
+
+@pytest.mark.parametrize("features", [["T", "dT"], 3, object()])
+def test_features_that_are_no_text_are_refused(features) -> None:
+    with pytest.raises(InputError, match="a text such as"):
+        FeatureModel(features).fit(synthetic_run("a", 1.0))
