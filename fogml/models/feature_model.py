@@ -129,7 +129,6 @@ class FeatureModel(DriftModel):
 
     def _chosen_features(self, runs: Sequence[Run]) -> Features:
         """Features for the training runs, no box learned yet."""
-        assert self.features is not None
         return resolve_features(self.features, runs)
 
     def _fit_rows(self, rows: Sequence[RunRows], features: Features) -> int:
@@ -283,9 +282,9 @@ def check_feature_text(text: str) -> None:
     parse_features(text.replace(_EACH_SENSOR, "T1") if isinstance(text, str) else text)
 
 
-def resolve_features(features: str | Features, runs: Sequence[Run]) -> Features:
+def resolve_features(features: str | Features | None, runs: Sequence[Run]) -> Features:
     """Features of one's own from their text, terms with ``{sensor}`` written out for the runs' sensors."""
-    text = features.text if isinstance(features, Features) else features
+    text: Any = getattr(features, "text", features)
     resolved = parse_features(written_out(text, runs) if isinstance(text, str) else text)
     for run in runs:
         check_holds(run, resolved.sensors, resolved.text)
