@@ -207,6 +207,8 @@ def _walk(
 
     A sweep up, then down to where they begin, takes at most half of it, faster than `speed` where it must.
     """
+    if low == high:
+        return np.full(count, low)
     start, rates = rng.uniform(low, high), np.empty(0)
     if swept:
         ways = np.array([high - low, start - high])

@@ -110,6 +110,14 @@ def test_other_columns_and_time_since_power_on_are_inputs(tmp_path, dtype):
     assert flag[0] == 2 and 0 in flag
 
 
+def test_a_column_that_never_moved_in_training_exports(tmp_path):
+    """As a supply that a laboratory holds: its trained range is a point."""
+    run = made_run(1, 1.0)
+    held = run.with_columns(light=np.full(len(run), 2.5))
+    model = make_model("polynomial", features="T, light, T*light").fit(held)
+    assert export_model(model, tmp_path, ExportSettings("c"))["largest_difference"] < 1e-4
+
+
 @pytest.mark.parametrize(
     ("text", "dtype", "told"),
     [
@@ -253,15 +261,20 @@ def test_readings_that_are_none_enter_neither_windows_nor_memories(model_of, tmp
     np.testing.assert_allclose(expected.drift[held], expected.drift[held - 1], atol=1e-12)
 
 
-def test_no_reading_holds_the_last_drift_and_a_false_first_one_is_replaced(model_of, tmp_path):
-    source = c_source(Plan.of(model_of("polynomial")), "float64", [])
-    program = CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW)
+@pytest.mark.parametrize("flags", [SANITIZERS, (*FLAGS, "-ffast-math")])
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_no_reading_holds_the_last_drift_and_a_false_first_one_is_replaced(model_of, tmp_path, dtype, flags):
+    """Where a compiler drops comparisons that tell NaN, too."""
+    source = c_source(Plan.of(model_of("polynomial")), dtype, [])
+    program = CProgram(source, tmp_path, flags=flags, running=WITH_SHADOW)
     temperature = np.full((300, 1), 20.0)
-    for place, broken in ((150, np.nan), (151, np.inf), (152, -1e30), (153, 85.0), (154, 85.0)):
+    temperature[[150, 200]] = np.nan
+    for place, broken in ((151, np.inf), (152, -1e30), (153, 85.0), (154, 85.0)):
         temperature[place] = broken
     out, flag = program.steps(2.0 * np.arange(300.0), temperature, np.full(300, 3.0))
     np.testing.assert_array_equal(out[150:155], out[149])
     np.testing.assert_array_equal(flag[148:156], [0, 0, 2, 2, 2, 2, 2, 0])
+    np.testing.assert_array_equal(flag[199:202], [0, 2, 0])
     temperature[0] = 85.0  # as a DS18B20 shows at power-on
     late, flag_late = program.steps(2.0 * np.arange(300.0), temperature, np.full(300, 3.0))
     np.testing.assert_array_equal(flag_late[2:150], flag[1:149])

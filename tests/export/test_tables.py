@@ -6,6 +6,7 @@ import csv
 import itertools
 import json
 import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -220,6 +221,24 @@ def test_an_axis_of_any_name_has_a_table_in_c(tmp_path, axis):
         export_tables([model], tmp_path, TableSettings("segments"))["axes"][axis]["c_largest_difference"]
         < 0.01
     )
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_c_of_a_table_tells_what_is_no_number_with_fast_math_too(axes, tmp_path, dtype):
+    export_tables([axes["x"][0]], tmp_path, TableSettings("segments", dtype))
+    calls = "    failed += fogml_segments(&at, &output, &out) != expected;\n"
+    lines = "".join(
+        f"    at = {at}; output = {output}; expected = {flag};\n{calls}"
+        for at, output, flag in [("20", "1", 0), ("NAN", "1", 2), ("20", "NAN", 2), ("INFINITY", "1", 2)]
+    )
+    (tmp_path / "main.c").write_text(
+        '#include <math.h>\n#include "fogml_segments.h"\nint main(void)\n{\n'
+        "    volatile fogml_segments_real in = 0;\n    fogml_segments_real at = in, output = in, out = in;\n"
+        f"    int expected, failed = 0;\n{lines}    return failed;\n}}\n"
+    )
+    words = ["gcc", "-std=c99", "-O2", "-ffast-math", "main.c", "fogml_segments.c", "-o", "main"]
+    subprocess.run(words, cwd=tmp_path, check=True)
+    assert subprocess.run([tmp_path / "main"]).returncode == 0
 
 
 def test_a_run_that_none_was_trained_on_is_refused(axes, tmp_path):
