@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fogml.errors import InputError
-from fogml.numerals import averages, listed, number, percent, short, unit_of
+from fogml.numerals import averages, listed, number, percent, short, unit_of, unit_words
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import render
@@ -176,7 +176,7 @@ def _figures(run: RunJudgement) -> Table:
             # What is not told from nothing has no figure.
             value = number(term["value"]) if least > 0.0 else f"at most {number(most)}"
             told = f"{number(least)} to {number(most)}"
-            add(_TERMS[name], f"{value} {term['unit']}", told, "Noise terms of the run")
+            add(_TERMS[name], f"{value} {unit_words(term['unit'])}", told, "Noise terms of the run")
     return Table("Figure | >Value | >90 % interval | Of", rows)
 
 

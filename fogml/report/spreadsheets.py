@@ -34,7 +34,12 @@ def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
         writer.table(sheet, (*_HEADS, *_MORE), rows, 3)
         sheet.set_column(0, 4, 24)
         sheet.set_column(5, 12, 14)
-        told = list(product(("before", "after"), ("start", "up", "down", "hysteresis")))
+        # Without a model there is nothing after it.
+        told = list(
+            product(
+                ("before", "after") if values["model"] else ("before",), ("start", "up", "down", "hysteresis")
+            )
+        )
         heads = [f"{part} {when} [deg/h]" for when, part in told]
         lines = [
             [line["run"], line["temperature_degC"], *(line[when][part] for when, part in told)]
@@ -81,6 +86,8 @@ _UNIT_COLUMNS = {
     "met": "limits met",
     **{key: key for key in ("verdict", "reason", "folder")},
 }
+_ASKED = ("design_index", "limits", "acceptance_limits")
+"""Settings of a fleet that state limits; where none does, none is met."""
 _CAUSE_COLUMNS = (
     *("effect", "place", "units_named", "units_told", "prevalence", "shared"),
     *("amplitude", "amplitude_se", "between_units", "unit", "energy_share", "gap_rms_without"),
@@ -90,14 +97,20 @@ _CAUSE_COLUMNS = (
 def fleet_spreadsheet(fleet: Mapping[str, Any], path: str | Path) -> None:
     """Write a ``fleet.json`` (schema ``fogml.fleet/1``) as `acceptance_spreadsheet`."""
     with whole_workbook(path) as writer:
-        writer.table_sheet("Units", _UNIT_COLUMNS, fleet["units"], (16,)).freeze_panes(1, 1)
+        asked = any(fleet["settings"].get(name) for name in _ASKED)
+        units = [unit if asked else {**unit, "met": None} for unit in fleet["units"]]
+        writer.table_sheet("Units", _UNIT_COLUMNS, units, (16,)).freeze_panes(1, 1)
         if "diagnosis" in fleet:
             heads = {key: key.replace("_", " ") for key in _CAUSE_COLUMNS}
             writer.table_sheet("Causes", heads, fleet["diagnosis"]["causes"])
         if "constants" in fleet:
             found = fleet["constants"]
-            errors = [f"{name}, standard error" for name in found["names"]]
-            names = ["unit", *found["names"], *errors, "distance"]
+            told = [
+                f"{name}{what} [deg/h{'' if name == '1' else ' per its unit'}]"
+                for what in ("", ", standard error")
+                for name in found["names"]
+            ]
+            names = ["unit", *told, "distance"]
             table = zip(found["units"], found["values"], found["se"], found["distance"], strict=True)
             rows = [[unit, *own, *se, far] for unit, own, se, far in table]
             writer.table_sheet("Constants", names, rows, (16,)).freeze_panes(1, 1)

@@ -292,9 +292,9 @@ def _series(errors: RunErrors, metrics: RunMetrics, before: FloatArray, after: F
     run, used = errors.run, errors.used
     held = leading_temperature(run)
     temperature = np.full(len(run), np.nan) if held is None else held
-    columns = [temperature, before, after, errors.drift, errors.half_width]
+    columns = [temperature, before, after, errors.half_width]
     averages = metrics.averages(*(column[used] for column in columns))
-    temperature, before, after, drift, half_width = averages.values
+    temperature, before, after, half_width = averages.values
     # A window is named after the regime and the flag of its middle sample.
     middle = np.flatnonzero(used)[(averages.starts + averages.stops) // 2]
     found = regimes(run)
@@ -305,7 +305,7 @@ def _series(errors: RunErrors, metrics: RunMetrics, before: FloatArray, after: F
         rate=rate,
         before=before,
         after=after,
-        drift=drift,
+        drift=before - after,
         lower=-half_width,
         upper=half_width,
         regime=np.asarray(found.names, dtype=np.str_)[found.labels[middle]],

@@ -78,9 +78,10 @@ class Repeatability:
 class AveragedSeries:
     """Averages over ``averaging_s``, for figures; every array has shape (m,).
 
-    ``before`` and ``after`` in deg/h, ``lower`` and ``upper`` the 90 % prediction interval of
-    ``after`` about zero, ``temperature`` in degC, ``rate`` of temperature in degC/min,
-    ``time`` in s, ``regime`` the names of the regimes, ``flag`` 0, 1 or 2 as in compensate.
+    ``before`` and ``after`` in deg/h, ``drift`` what the model takes away between them, ``lower``
+    and ``upper`` the 90 % prediction interval of ``after`` about zero, ``temperature`` in degC,
+    ``rate`` of temperature in degC/min, ``time`` in s, ``regime`` the names of the regimes,
+    ``flag`` 0, 1 or 2 as in compensate.
     """
 
     time: FloatArray

@@ -170,6 +170,9 @@ def test_command_writes_page_sheets_and_json(cycle, tmp_path):
     sheet = openpyxl.load_workbook(tmp_path / "out" / "acceptance.xlsx")["Acceptance"]
     found = {line[0]: line[6] for line in sheet.iter_rows(min_row=5, values_only=True)}
     assert found["hysteresis"] == pytest.approx(row(values, "hysteresis")["before"])
+    soaks = openpyxl.load_workbook(tmp_path / "out" / "acceptance.xlsx")["Soaks"]
+    heads = [cell.value for cell in soaks[1]]
+    assert [head for head in heads if "before" in head] and not [head for head in heads if "after" in head]
     held = openpyxl.load_workbook(tmp_path / "out" / "acceptance.xlsx")["Stands on"]
     stated = dict(held.iter_rows(min_row=2, max_col=2, values_only=True))
     assert stated["SHA-256 of limits.yaml"] == values["limits"]["sha256"]

@@ -107,6 +107,7 @@ def test_the_sheet_tells_synthetic_data_set_up_and_figures_over_n_less_one() -> 
         "Bias stability, 10 s averages",
         "12.5 ppm",
         "Angle random walk",
+        "0.0200 deg/√h",
     ):
         assert part in text, part
     whole, held = run.series.after, at_constant_temperature(run)

@@ -14,9 +14,11 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.report.spreadsheet import spreadsheet
+from fogml.report.spreadsheets import fleet_spreadsheet
 from fogml.runs.findings import Finding
 from fogml.validation.results import Judgement, Metrics
 from tests.report.judgements import judged_run, judgement, linear_judgement
+from tests.report.many_units import fleet_values
 
 
 def sheets(judged: Judgement, folder: Path) -> dict[str, list[tuple[Any, ...]]]:
@@ -83,6 +85,20 @@ def test_names_of_runs_turn_into_neither_formulas_nor_broken_sheets(tmp_path: Pa
     assert workbook["Figures"]["A2"].data_type == "s"
     assert len(found) == 3 + 5
     assert all(len(name) <= 31 for name in found)
+
+
+def test_a_fleet_s_sheets_name_units_and_tell_limits_only_where_some_are_stated(tmp_path: Path) -> None:
+    fleet = fleet_values()
+    fleet["constants"] = {**fleet["constants"], "distance": [1.0] * len(fleet["constants"]["units"])}
+    assert {unit["met"] for unit in fleet["units"]} >= {True}
+    for stated, told in (({}, set()), ({"design_index": 0.05}, {"yes", "no"})):
+        fleet_spreadsheet({**fleet, "settings": stated}, tmp_path / "fleet.xlsx")
+        book = openpyxl.load_workbook(tmp_path / "fleet.xlsx")
+        rows = list(book["Units"].iter_rows(values_only=True))
+        assert {row[rows[0].index("limits met")] for row in rows[1:]} - {None} == told
+    heads = [cell.value for cell in book["Constants"][1]]
+    assert heads[1:3] == ["1 [deg/h]", "T [deg/h per its unit]"]
+    assert all("[" in head for head in heads if head not in ("unit", "distance"))
 
 
 def test_missing_values_are_empty_cells(tmp_path: Path) -> None:

@@ -55,6 +55,9 @@ def test_unknown_earth_rate_takes_the_training_mean_off_both():
     assert run.after.bias == pytest.approx(0.2, abs=1e-9)
     assert result.train[0].after.bias == pytest.approx(0.0, abs=1e-9)
     assert any("constant is estimated" in note for note in result.notes)
+    # What is drawn and written beside each other is about the same mean.
+    np.testing.assert_allclose(run.series.before - run.series.drift, run.series.after, atol=1e-12)
+    np.testing.assert_allclose(np.ptp(run.series.drift), np.ptp(run.series.before), rtol=1e-6)
 
 
 def test_no_model_leaves_before_and_after_the_same():
