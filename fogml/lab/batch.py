@@ -22,6 +22,8 @@ from fogml.numerals import in_order_of_serial
 SCHEMA = "fogml.batch/1"
 REPORT = "acceptance.json"
 _SHARES = {"least": 0.0, "q10": 0.1, "median": 0.5, "q90": 0.9, "largest": 1.0}
+BOUNDS = ("at_most", "at_least")
+"""Keys of a row whose figure is a bound alone."""
 _ROW = ("quantity", "tested", "limit", "met")
 _ORDER = {REJECTED: 0, INCOMPLETE: 1, NO_LIMITS: 2, ACCEPTED: 3}
 
@@ -78,7 +80,8 @@ def batch_json(reports: Sequence[tuple[Path, Mapping[str, Any]]], home: Path | N
     -------
     dict
         Schema ``fogml.batch/1``: ``counts`` of verdicts, ``yield`` with its 90 % interval, ``quantities``
-        with distribution of sizes, limit and how many are over it, ``units`` with those rejected first.
+        with distribution of sizes, limit, how many are over it and of how many the figure is an upper or
+        lower bound alone (``at_most``, ``at_least``), ``units`` with those rejected first.
     """
     units = [_unit(file, report, home) for file, report in reports]
     units.sort(key=_place)
@@ -130,6 +133,7 @@ def _unit(file: Path, report: Mapping[str, Any], home: Path | None) -> dict[str,
         "page": link,
         "figures": {row["quantity"]: figure_of(row) for row in report["rows"] if row["tested"]},
         "missed": [row["quantity"] for row in report["rows"] if row["met"] is False],
+        **{bound: [row["quantity"] for row in report["rows"] if row.get(bound)] for bound in BOUNDS},
     }
 
 
@@ -151,7 +155,9 @@ def _quantities(reports: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "tested": len(held),
                 "distribution": dict(zip(_SHARES, map(float, quantiles), strict=True)),
                 "limit": limits[0] if limits and all(limit == limits[0] for limit in limits) else None,
+                "limits_differ": any(limit != limits[0] for limit in limits),
                 "over": sum(row["met"] is False for row in rows),
+                **{bound: sum(bool(row.get(bound)) for row in rows) for bound in BOUNDS},
             }
         )
     return told

@@ -62,9 +62,13 @@ def limit_words(limit: Mapping[str, float | None] | None) -> str:
 
 def figure_words(row: Mapping[str, Any], when: str) -> str:
     """A row's figure as people write it: one that is only known to be no more or less with its sign."""
-    told = number(row[when])
-    sign = "≤ " if row.get("at_most") else "≥ " if row.get("at_least") else ""
-    return f"{sign}{told}" if row[when] is not None else told
+    return bounded(row[when], bool(row.get("at_most")), bool(row.get("at_least")))
+
+
+def bounded(value: float | None, at_most: bool, at_least: bool) -> str:
+    """A figure, with the sign of what is only known to be no more, or no less; bare where both are mixed."""
+    sign = "" if value is None or at_most == at_least else "≤ " if at_most else "≥ "
+    return f"{sign}{number(value)}"
 
 
 def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -241,10 +245,10 @@ def distribution_table(values: Mapping[str, Any]) -> Table:
     rows = [
         (
             one["name"],
-            one["unit"],
+            unit_words(one["unit"]),
             str(one["tested"]),
-            *(number(one["distribution"][part]) for part in parts),
-            limit_words(one["limit"]) or MISSING,
+            *(bounded(one["distribution"][p], bool(one["at_most"]), bool(one["at_least"])) for p in parts),
+            "they differ" if one["limits_differ"] else limit_words(one["limit"]) or MISSING,
             str(one["over"]),
         )
         for one in values["quantities"]
@@ -256,13 +260,17 @@ def distribution_table(values: Mapping[str, Any]) -> Table:
 
 def _units(units: Sequence[Mapping[str, Any]], shown: Sequence[Mapping[str, Any]]) -> Table:
     """A line for each unit, with its page, verdict and figures."""
-    heads = tuple((one["name"], one["unit"], "figure") for one in shown)
+    heads = tuple((one["name"], unit_words(one["unit"]), "figure") for one in shown)
     rows = []
     for unit in units:
         kind, sign, words = VERDICTS[unit["verdict"]]
         name = " ".join(part for part in (unit["serial_number"], unit["axis"]) if part)
         figures = {one["quantity"]: unit["figures"].get(one["quantity"]) for one in shown}
-        told = [number(figure) + (" ✗" if key in unit["missed"] else "") for key, figure in figures.items()]
+        told = [
+            bounded(figure, key in unit["at_most"], key in unit["at_least"])
+            + (" ✗" if key in unit["missed"] else "")
+            for key, figure in figures.items()
+        ]
         cells = (name, f"{sign} {words}", *told)
         rows.append(Row(cells, link=unit["page"], badge=kind, keys=(name, words, *figures.values())))
     return Table((*columns_of("Unit | Verdict"), *heads), rows, sortable=True)

@@ -36,12 +36,19 @@ def monitor_page(monitor: Mapping[str, Any]) -> str:
     """The self-contained HTML page of a ``monitor.json``, schema ``fogml.monitor/1``."""
     units = sorted(monitor["units"], key=lambda unit: in_order_of_serial(label_of(unit)))
     changed = [unit for unit in units if unit["state"] == "alarm"]
+    early = [unit for unit in units if unit["state"] == "baseline"]
     every = monitor["runs_between_false_alarms"]
     runs = sum(len(unit["runs"]) for unit in units)
     if changed:
         verdict = [f"{plural(len(changed), 'unit has', 'units have')} changed."]
+    elif len(early) == len(units):
+        verdict = ["No change can be told yet: all runs are the first ones of their units."]
     else:
         verdict = ["No unit has changed."]
+    if 0 < len(early) < len(units):
+        verdict.append(
+            f"Of {plural(len(early), 'unit')} only the first runs are there, which tell no change."
+        )
     verdict.append(
         f"{plural(len(units), 'unit')} with {plural(runs, 'run')}; where runs are alike and "
         f"independent, one in {every:g} gives a false alarm, at most."
@@ -63,8 +70,8 @@ def monitor_page(monitor: Mapping[str, Any]) -> str:
                 "Changed",
                 str(len(changed)),
                 "",
-                "by all runs so far",
-                "missed" if changed else "met",
+                f"{len(early)} can't be told yet" if early else "by all runs so far",
+                "missed" if changed else "" if len(early) == len(units) else "met",
             ),
             Tile("Runs", str(runs), "", f"{monitor['runs']['added']} new"),
         ],

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.escaping import cell_text
+from fogml.lab.batch import BOUNDS
 from fogml.report.acceptance_page import VERDICTS, files_of, limit_words, named
 from fogml.report.spreadsheet import whole_workbook
 
@@ -65,13 +66,21 @@ def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
     with whole_workbook(path) as writer:
         heads = {"serial_number": "unit", "axis": "axis", "verdict": "verdict", "why": "reasons"}
         heads |= {one["quantity"]: f"{one['name']} [{one['unit']}]" for one in values["quantities"]}
-        rows = [{**one["figures"], **one, "why": "; ".join(one["reasons"])} for one in values["units"]]
-        writer.table_sheet("Units", heads, rows, (18,)).freeze_panes(1, 1)
-        same = ("unit", "tested", "least", "q10", "median", "q90", "largest", "limit", "over")
-        told = [
-            {**one, **one["distribution"], "limit": limit_words(one["limit"])} for one in values["quantities"]
+        bounds = {bound: f"told as {bound.replace('_', ' ')}" for bound in BOUNDS}
+        heads |= {bound: head for bound, head in bounds.items() if any(one[bound] for one in values["units"])}
+        rows = [
+            {**one["figures"], **one, "why": "; ".join(one["reasons"])}
+            | {bound: ", ".join(one[bound]) for bound in BOUNDS}
+            for one in values["units"]
         ]
-        names = {"name": "quantity", **{key: key for key in same}}
+        writer.table_sheet("Units", heads, rows, (18,)).freeze_panes(1, 1)
+        same = ("unit", "tested", "least", "q10", "median", "q90", "largest", "limit", "over", *BOUNDS)
+        told = [
+            {**one, **one["distribution"]}
+            | {"limit": "they differ" if one["limits_differ"] else limit_words(one["limit"])}
+            for one in values["quantities"]
+        ]
+        names = {"name": "quantity", **{key: key.replace("_", " ") for key in same}}
         writer.table_sheet("Distribution", names, told, (18,))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import openpyxl
@@ -14,6 +15,8 @@ from fogml.errors import InputError
 from fogml.lab.acceptance_rows import QUANTITIES
 from fogml.lab.batch import batch_json, read_reports
 from fogml.numerals import in_order_of_serial
+from fogml.report.acceptance_page import batch_page, distribution_table
+from fogml.report.spreadsheets import batch_spreadsheet
 
 SERIAL = "FOG-70-A-2026-BATCH-17-OF-THE-SECOND-LINE-{:04d}"
 LIMIT = {"from": -0.05, "to": 0.05}
@@ -102,6 +105,21 @@ def test_yield_distribution_and_order(folders, tmp_path):
     names = [unit["serial_number"][-4:] for unit in values["units"]]
     assert names[:2] == ["0004", "0008"] and names[2:] == sorted(names[2:])
     assert values["units"][0]["page"] == "../unit4/acceptance.html"
+
+
+def test_figures_that_are_bounds_and_limits_that_differ_are_told_as_such(tmp_path):
+    reports = [(Path(f"{place}.json"), report(place, bias)) for place, bias in enumerate((0.01, 0.02))]
+    for place, (_, told) in enumerate(reports):
+        (row,) = (row for row in told["rows"] if row["quantity"] == "bias")
+        row |= {"at_most": True, "limit": {"from": -0.1 - place, "to": 0.1 + place}}
+    values = batch_json(reports)
+    (cells,) = (row.cells for row in distribution_table(values).rows)
+    assert cells[3:8] == ("≤ 0.0100", "≤ 0.0110", "≤ 0.0150", "≤ 0.0190", "≤ 0.0200")
+    assert cells[8] == "they differ"
+    assert "≤ 0.0200" in batch_page(values)
+    batch_spreadsheet(values, tmp_path / "batch.xlsx")
+    head, first, *_ = openpyxl.load_workbook(tmp_path / "batch.xlsx")["Units"].iter_rows(values_only=True)
+    assert first[head.index("told as at most")] == "bias" and "told as at least" not in head
 
 
 def test_a_unit_twice_and_a_file_of_another_kind_are_refused(folders, tmp_path):

@@ -201,6 +201,15 @@ def test_first_runs_are_a_baseline():
     assert unit.state == "baseline"
 
 
+def test_units_of_first_runs_alone_are_not_said_to_be_unchanged():
+    early, steady = service(3, unit="FOG-2"), service(20, unit="FOG-1")
+    page = monitor_page(values_of(watch(early)))
+    assert "No unit has changed" not in page and "No change can be told yet" in page
+    page = monitor_page(values_of(watch([*early, *steady])))
+    assert "No unit has changed" in page and "Of 1 unit only the first runs are there" in page
+    assert "1 can&#39;t be told yet" in page
+
+
 def test_pages_show_units_of_any_name():
     records = [*service(step_at=10), *service(2, unit="<b>&/.."), *service(5, unit="")]
     values = values_of(watch(records))
