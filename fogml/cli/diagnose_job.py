@@ -17,7 +17,7 @@ from fogml.gap.own_simulator import ByColumn, by_column, has_column
 from fogml.gap.result import Diagnosis
 from fogml.gap.units import UnitsDiagnosis, diagnose_units
 from fogml.json_files import finite_json, write_json
-from fogml.numerals import with_error
+from fogml.numerals import listed, with_error
 from fogml.outputs import whole_folder
 from fogml.runs.columns import REPLAYED
 from fogml.runs.run import Run
@@ -75,9 +75,14 @@ def write_several(
 def print_several(found: UnitsDiagnosis, terminal: Terminal) -> None:
     """Each unit's verdict, and what is shared."""
     for unit, words in _words(found).items():
-        terminal.say(f"{unit}: {words}")
+        terminal.say(f"{unit}: {words}; fitted: {_used(found.by_unit[unit])}")
     for line in found.lines():
         terminal.say(line)
+
+
+def _used(found: Diagnosis) -> str:
+    """The runs that were fitted, and those held out."""
+    return listed(found.fit) + ("" if found.held_out_is_part else f"; held out: {listed(found.held_out)}")
 
 
 def _words(found: UnitsDiagnosis) -> dict[str, str]:
@@ -191,6 +196,7 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
     from fogml.report.gap_tables_ahead import compensation_table, rehearsal_table
     from fogml.report.gap_words import titles
 
+    terminal.say(f"Fitted: {_used(found)}")
     terminal.say(f"Verdict: {found.verdict.replace('_', ' ')}")
     if found.found:
         rows = [

@@ -13,11 +13,11 @@ from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals
 from fogml.gap.causes import cause_shares, energy, found_cause
 from fogml.gap.compensation import compensation_of
+from fogml.gap.doubtful_runs import doubts
 from fogml.gap.fitted_model import Explained, explained
 from fogml.gap.how_far import Foretold, HeldOut
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
 from fogml.gap.model import AnyModel, TwinModel
-from fogml.gap.noise import not_static
 from fogml.gap.own_simulator import candidates_of
 from fogml.gap.planning.next_run import next_run, rehearse
 from fogml.gap.posterior import Cause, Judgement, doubted
@@ -35,7 +35,7 @@ from fogml.gap.result_parts import Nearest, WhatIf
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.where import GapOnRun, where
 from fogml.processes import one_thread
-from fogml.runs.exchange import runs_of
+from fogml.runs.exchange import one_run, runs_of
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.twin.registry import effects
@@ -110,7 +110,7 @@ def diagnose(
     rehearsed
         Whether to tell what these runs would name of each candidate.
     cost_of_false_name
-        Of a false name over that of a missed one: a cause is named from odds of this on.
+        Of a false name over that of a missed one, above 0: a cause is named from odds of this on.
     courses
         Whether to keep what each effect makes of each run, for a page on which their sizes are moved.
     progress
@@ -123,15 +123,21 @@ def diagnose(
         unknown, or no run can be used.
     """
     tell = progress or (lambda what: None)
-    fit, held_out = runs_of(fit), runs_of(held_out)
-    model = as_twin(model) if isinstance(model, str | Path) else model
+    check_cost(cost_of_false_name)
+    fit, held_out, noise = runs_of(fit), runs_of(held_out), None if noise is None else one_run(noise)
     found = inferred(model, fit, held_out, noise, without, priors, tell)
     tell("judging on held-out runs")
     return answered(found, noise, not held_out, seed, cost_of_false_name, plan, rehearsed, courses, tell)
 
 
+def check_cost(of_false_name: float) -> None:
+    """Refuse a cost of a false name that is no number above 0."""
+    if not 0.0 < of_false_name < math.inf:
+        raise InputError(f"cost_of_false_name is {of_false_name:g}; a number above 0 is needed")
+
+
 def inferred(
-    model: Twin | AnyModel,
+    model: Twin | AnyModel | str | Path,
     fit: Sequence[Run],
     held_out: Sequence[Run],
     noise: Run | None,
@@ -140,7 +146,12 @@ def inferred(
     tell: Progress,
 ) -> Inference:
     """The posterior of causes behind the runs of one unit, once those are checked."""
-    model, without = TwinModel(model) if isinstance(model, Twin) else model, tuple(without)
+    given = as_twin(model) if isinstance(model, str | Path) else model
+    model = TwinModel(given) if isinstance(given, Twin) else given
+    if not hasattr(model, "constants"):
+        kind = type(given).__name__
+        raise InputError(f"a twin, its name or file, or a fogml.gap.model.GyroModel is needed, found {kind}")
+    without = (without,) if isinstance(without, str) else tuple(without)
     for id in without:
         if id not in candidates_of(model) and id not in effects():
             hint = did_you_mean(id, effects(), most=3)
@@ -255,7 +266,7 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
                 lies.segments,
                 any(found.kind(m) == "plant" for m in likeliest),
             ),
-            *not_static(noise, found.setting.priors.noise),
+            *doubts(found, noise, part),
         ),
     )
 

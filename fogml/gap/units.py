@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.cards import in_form, replaced
-from fogml.gap.diagnosis import answered, inferred
+from fogml.gap.diagnosis import answered, check_cost, inferred
 from fogml.gap.inference import Inference, Progress
 from fogml.gap.model import AnyModel
 from fogml.gap.result import Diagnosis, Estimate
@@ -93,7 +94,7 @@ class UnitsDiagnosis:
 
 
 def diagnose_units(
-    model: Twin | AnyModel,
+    model: Twin | AnyModel | str | Path,
     fit: Sequence[Run],
     held_out: Sequence[Run] = (),
     *,
@@ -116,7 +117,11 @@ def diagnose_units(
     InputError
         If a run does not say its unit, a unit has no fit run, or as of one unit.
     """
-    tell, without = progress or (lambda what: None), tuple(without)
+    tell, without = (
+        progress or (lambda what: None),
+        (without,) if isinstance(without, str) else tuple(without),
+    )
+    check_cost(cost_of_false_name)
     units = _by_unit(fit)
     held, static = _by_unit(held_out), _by_unit(noise)
     for unit in (*held, *static):

@@ -20,6 +20,7 @@ from fogml.runs.run import Run
 from fogml.runs.thermometers import leading_temperature
 from fogml.signals.averages import AVERAGING_S
 from fogml.signals.floor import Floor
+from fogml.signals.shared import shared_samples
 from fogml.validation.floors import check_noise_run, floor_of_run, out_of_reach
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics, check_turn_on_band, repeatability_of
@@ -182,27 +183,6 @@ def _seen(run: Run, train: Sequence[Run], model: DriftModel) -> tuple[Finding, .
             )
             return (Finding("seen_in_training", message, count=round(share * len(run))),)
     return ()
-
-
-def shared_samples(values: FloatArray, others: FloatArray, length: int = 64, places: int = 16) -> float:
-    """Share of values, shape (n,), that stand in others, shape (m,), in the same order.
-
-    Told at so many places, by as many values in a row as `length`. Where fewer than an eighth of them change,
-    as of an output that stands still, they tell nothing.
-    """
-    length = min(length, len(values), len(others))
-    told, found = 0, 0
-    for start in np.linspace(0, len(values) - length, places).astype(int).tolist():
-        row = values[start : start + length]
-        if np.count_nonzero(np.diff(row)) < length / 8:
-            continue
-        at = np.flatnonzero(others[: len(others) - length + 1] == row[0])
-        for step in range(1, length):
-            at = at[others[at + step] == row[step]]
-            if not len(at):
-                break
-        told, found = told + 1, found + bool(len(at))
-    return found / told if told else 0.0
 
 
 def judge_run(

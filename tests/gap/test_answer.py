@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -186,3 +187,39 @@ def test_a_noise_run_through_which_temperature_moves_is_told(tactical, runs):
 def test_a_held_out_run_is_no_noise_run(tactical, runs):
     with pytest.raises(InputError, match="as a held-out run and as the noise run too"):
         diagnose(TwinModel(tactical), runs[:2], runs[2:3], noise=runs[2])
+
+
+def test_runs_that_can_not_be_are_told(tactical, runs):
+    """A held-out run cut from a fit run with an overlap; two runs of one unit at one time."""
+    whole, other, third = (replace(run, name=name) for run, name in zip(runs, ("one", "two", "three")))
+    tail = replace(whole[len(whole) // 2 :], name="tail")
+    start = datetime(2026, 3, 2, 8, tzinfo=UTC)
+    dated = [
+        run.with_facts(run.facts.model_copy(update={"started": start + timedelta(hours=hours)}))
+        for run, hours in ((whole, 0.0), (other, 3.0), (third, 48.0))
+    ]
+
+    def said(fit, held_out):
+        told = diagnose(TwinModel(tactical), fit, held_out, plan=False).headline
+        return [line for line in told if "holds samples" in line or "overlap" in line]
+
+    assert said([whole, other], third) == []
+    (cut,) = said([whole, other], tail)
+    assert cut.startswith("tail holds samples of the fit run one (about 100 %)")
+    (both,) = said(dated[:2], dated[2])
+    assert both.startswith("one and two are of one unit and overlap by 4.6 h by their 'started'")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"cost_of_false_name": 0.0}, "cost_of_false_name is 0"),
+        ({"cost_of_false_name": float("nan")}, "cost_of_false_name is nan"),
+        ({"noise": "static.csv"}, "runs are needed, found str"),
+        ({"without": "moistur"}, "did you mean 'moisture'"),
+        ({"model": None}, "a twin, its name or file"),
+    ],
+)
+def test_arguments_that_are_none_are_refused_by_what_they_are(runs, given, message):
+    with pytest.raises(InputError, match=message):
+        diagnose(**{"model": "tactical", "fit": runs[:1], "held_out": runs[2]} | given)
