@@ -16,7 +16,7 @@ from fogml.intervals import SIGMA_PER_MEDIAN
 from fogml.numerals import short
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
-from fogml.runs.turning import implausible_rest, turning
+from fogml.runs.turning import implausible_rest, turned_earth_rate, turning
 from fogml.signals import large
 
 HOUR_S = 3600.0
@@ -113,7 +113,7 @@ def implausible(run: Run) -> Iterator[Finding]:
     except InputError:
         return  # counts whose scale factor is not stated
     yield from _scale_factor(run, gyro)
-    yield from _earth_rate(run, gyro)
+    yield from list(turned_earth_rate(run)) or _earth_rate(run, gyro)
     yield from implausible_rest(run, gyro)
 
 

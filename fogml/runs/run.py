@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.runs.arrival_times import sampling_times
+from fogml.runs.attitude import reference_deg_h, with_table_axis
 from fogml.runs.columns import coil_sensor_number, is_temperature
 from fogml.runs.dropouts import RULE, DropoutRule, Reading, last_reading, read_thermometer
 from fogml.runs.exchange import Exchange
@@ -77,10 +78,9 @@ class Run(Exchange):
 
     def _freeze(self, columns: Mapping[str, FloatArray]) -> None:
         """Take columns as read-only views of one length."""
-        frozen: dict[str, FloatArray] = {}
-        for name, values in columns.items():
-            frozen[name] = np.asarray(values, dtype=np.float64).view()
-            frozen[name].flags.writeable = False
+        frozen = {name: np.asarray(values, dtype=np.float64).view() for name, values in columns.items()}
+        for values in frozen.values():
+            values.flags.writeable = False
         for name in (name for name in ("time", "gyro") if name not in frozen):
             raise InputError(f"{self.name}: no column '{name}'; a run always needs time and gyro")
         lengths = {name: values.shape for name, values in frozen.items()}
@@ -155,8 +155,8 @@ class Run(Exchange):
 
     @cached_property
     def reference_deg_h(self) -> FloatArray:
-        """Reference rate [deg/h], shape (n,): table rate plus Earth rate where it is known."""
-        return large.each(lambda rate: 3600.0 * rate + (self.facts.earth_rate_deg_h or 0.0), self.rate)
+        """Reference rate [deg/h], shape (n,): table rate plus Earth rate, as the table's angle turns it."""
+        return reference_deg_h(self.facts, self.rate, self.columns.get("angle"))
 
     @cached_property
     def error_deg_h(self) -> FloatArray:
@@ -305,7 +305,8 @@ class Run(Exchange):
     def __getitem__(self, part: slice | BoolArray) -> Run:
         """A part of the run in its order: views by a slice, ``run[100:200]``, copies by a mask."""
         check_forwards(self.name, part)
-        return self._with({name: values[part] for name, values in self.columns.items()})
+        facts = with_table_axis(self.facts, self.rate)
+        return self._with({name: values[part] for name, values in self.columns.items()}, facts=facts)
 
     def with_columns(self, **columns: ArrayLike) -> Run:
         """The run with columns added or replaced (internal units)."""

@@ -13,6 +13,7 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import counted
 from fogml.intervals import MEDIAN_SIZE
 from fogml.numerals import short
+from fogml.runs.attitude import attitude, with_table_axis
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
 from fogml.signals import large
@@ -44,6 +45,23 @@ def turning(run: Run) -> BoolArray:
 def least_rate_deg_s(run: Run, noises: float = 6.0) -> float:
     """The least table rate that is not rest [deg/s]: `LEAST_RATE_DEG_S`, or so many times its own noise."""
     return max(LEAST_RATE_DEG_S, noises * white_noise(run.rate))
+
+
+def turned_earth_rate(run: Run) -> Iterator[Finding]:
+    """What is said where a recorded table angle carries the input axis from where the facts have it."""
+    angle = run.columns.get("angle")
+    if angle is None or not run.earth_known or "position" in run.columns or not angle.any():
+        return
+    if attitude(with_table_axis(run.facts, run.rate)).fixed:
+        return
+    earth = large.each(lambda reference, rate: reference - 3600.0 * rate, run.reference_deg_h, run.rate)
+    least, most = (short(value, 4) for value in large.extremes(earth))
+    along = least if least == most else f"{least} to {most}"
+    told = (
+        f"'angle' turns the input axis: Earth rate along it is taken for {along} deg/h, 'input_axis' being "
+        "where it points at table angle 0"
+    )
+    yield Finding("turned_earth_rate", told, column="angle", count=len(run))
 
 
 CODE = "implausible_rest"

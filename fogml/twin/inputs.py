@@ -11,9 +11,9 @@ import numpy as np
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
+from fogml.runs.attitude import Attitude, attitude, earth_rate, turned
 from fogml.runs.facts import Facts
 from fogml.signals.averages import covered_share, mean_cosine, with_whole_turns
-from fogml.twin.attitude import Attitude, attitude, earth_rate, turned
 from fogml.twin.memory import Memory
 from fogml.twin.optics import REFERENCE_COIL, Coil, Light
 

@@ -12,12 +12,11 @@ from weakref import finalize
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.runs.attitude import earth_field, with_table_axis
 from fogml.runs.columns import coil_sensor_number
 from fogml.runs.exchange import one_run
-from fogml.runs.facts import Direction, Facts, Heading
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.steps import noisy_beyond
-from fogml.twin.attitude import earth_field
 from fogml.twin.chain import hidden, through_chain
 from fogml.twin.effect import Effect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import REST, STAND_INS, Inputs
@@ -98,7 +97,7 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
         temperatures=temperatures,
         table_rate=run.rate,
         earth_deg_h=run.facts.earth_rate_deg_h or 0.0,
-        facts=_with_table_axis(run),
+        facts=with_table_axis(run.facts, run.rate),
         powered_on_s=windows[0][0],
         power_ons_s=tuple(on for on, _ in windows[1:]),
         power_offs_s=tuple(off for _, off in windows[:-1]),
@@ -116,16 +115,6 @@ def dates_s(run: Run) -> float:
     """Time of a run's first sample where its clock tells dates, as seconds since 1970 do, else 0 [s]."""
     first = float(run.time[0])
     return first if first > _LONGEST_ON_S else 0.0
-
-
-def _with_table_axis(run: Run) -> Facts:
-    """A run's facts; a table that turns about a horizontal input axis has that axis, if nothing is stated."""
-    facts = run.facts
-    if facts.table_axis is not None or facts.input_axis in (None, "up", "down") or not run.rate.any():
-        return facts
-    axis = facts.input_axis
-    table = Direction(heading=axis.heading) if isinstance(axis, Heading) else axis
-    return facts.model_copy(update={"table_axis": table})
 
 
 def inputs_of_truth(truth: Truth, run: Run) -> Inputs:

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.runs.attitude import earth_rate, turned
 from fogml.signals.bases import sine
-from fogml.twin.attitude import earth_rate, turned
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA, delta_of
 
@@ -56,7 +56,7 @@ def tilt_response(inputs: Inputs, direction_deg: float) -> FloatArray:
                      + 3600 cos(direction) table rate
 
     for a table whose axis is up: the Earth's rate and the table's, across the axis in the direction of the
-    tilt, which the table carries round (`fogml.twin.attitude`). A vertical axis tilts to north at direction
+    tilt, which the table carries round (`fogml.runs.attitude`). A vertical axis tilts to north at direction
     0 and table angle 0, a horizontal one upwards, and in azimuth at 90 deg. Where the attitude is not known
     the axis is taken for an upright one, and where the latitude is not, for one at 45 deg.
     """

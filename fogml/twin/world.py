@@ -12,10 +12,10 @@ import numpy as np
 
 from fogml.arrays import BoolArray
 from fogml.errors import InputError
+from fogml.runs.attitude import attitude, earth_field
 from fogml.runs.columns import is_temperature
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
-from fogml.twin.attitude import attitude, earth_field
 from fogml.twin.chain import (
     Branch,
     ChainOutput,

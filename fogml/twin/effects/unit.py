@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.twin.attitude import UP, earth_field
+from fogml.runs.attitude import UP, earth_field
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.noise import stream

@@ -9,8 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fogml.arrays import FloatArray
+from fogml.runs.attitude import attitude, earth_field
 from fogml.runs.facts import EARTH_RATE_DEG_H, Direction, Facts, Heading
-from fogml.twin.attitude import attitude, earth_field
+from fogml.runs.run import Run
+from fogml.runs.turning import turned_earth_rate
 from fogml.twin.inputs import Inputs
 from fogml.twin.registry import effect
 from fogml.twin.replay import replay
@@ -174,3 +176,47 @@ def test_whole_turns_of_a_fast_table_unwrap_about_a_downward_axis() -> None:
     whole = replay(twin, run)[moving]
     assert replay(twin, wrapped)[moving] == pytest.approx(whole, abs=1e-9)
     assert whole == pytest.approx(run.gyro[moving], abs=1e-7)
+
+
+def carried_round(facts: Facts, rate_deg_s: float = 0.0) -> Run:
+    """A gyro of no error: at rest, a turn by 210 deg, at rest again."""
+    time = np.arange(300.0)
+    angle = np.clip(7.0 * (time - 100.0), 0.0, 210.0)
+    rate = np.where((time >= 100.0) & (time < 130.0), rate_deg_s, 0.0)
+    return Run.from_columns("turned", facts, time=time, gyro=0.0 * time, rate=rate, angle=angle)
+
+
+@pytest.mark.parametrize(
+    ("axis", "table", "sense"),
+    [
+        ("north", None, 1.0),
+        ("east", None, 1.0),
+        (Heading(heading=75.0), "up", 1.0),
+        (Heading(heading=75.0), "down", -1.0),
+    ],
+)
+def test_the_reference_holds_the_earth_as_the_table_turns_the_axis(axis, table, sense):
+    """15.041 cos(lat) cos(heading), the heading less the angle of a table that turns counter-clockwise."""
+    run = carried_round(Facts(latitude=40.0, input_axis=axis, table_axis=table))
+    start = {"north": 0.0, "east": 90.0}.get(axis, 75.0) if isinstance(axis, str) else axis.heading
+    heading = np.radians(start - sense * run.columns["angle"])
+    expected = 15.041067 * np.cos(np.radians(40.0)) * np.cos(heading)
+    np.testing.assert_allclose(run.reference_deg_h, expected, atol=1e-9)
+    np.testing.assert_allclose(run[150:].reference_deg_h, expected[150:], atol=1e-9)
+    assert "turned_earth_rate" in {finding.code for finding in turned_earth_rate(run)}
+
+
+@pytest.mark.parametrize("facts", [Facts(latitude=40.0, input_axis="up"), Facts(input_axis="north"), Facts()])
+def test_where_the_table_does_not_turn_it_the_earth_is_one_number(facts):
+    run = carried_round(facts, 7.0)
+    np.testing.assert_allclose(run.reference_deg_h - 3600.0 * run.rate, facts.earth_rate_deg_h or 0.0)
+    assert not list(turned_earth_rate(run))
+
+
+def test_a_part_at_rest_is_of_the_table_that_the_whole_run_tells():
+    """A table that turns about the horizontal input axis leaves the Earth's part of it alone."""
+    run = carried_round(Facts(latitude=40.0, input_axis="north"), 7.0)
+    north = 15.041067 * np.cos(np.radians(40.0))
+    np.testing.assert_allclose(run.reference_deg_h - 3600.0 * run.rate, north)
+    for part in (run[200:], run[200:][10:], run[run.time > 200.0]):
+        np.testing.assert_allclose(part.reference_deg_h, north)

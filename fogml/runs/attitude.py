@@ -21,6 +21,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.runs.facts import EARTH_RATE_DEG_H, Direction, Facts, Heading
+from fogml.signals import large
 
 _NAMED: dict[str, tuple[float, float]] = {
     "north": (0.0, 0.0),
@@ -113,6 +114,45 @@ def turned(fixed: FloatArray, carried: FloatArray, table: FloatArray) -> tuple[f
     parts = (constant, whole - constant, _dot(fixed, np.cross(table, carried)))
     least = _ROUND_OFF * float(np.linalg.norm(fixed))
     return tuple(0.0 if abs(part) < least else part for part in parts)  # type: ignore[return-value]
+
+
+def with_table_axis(facts: Facts, rate: FloatArray) -> Facts:
+    """Facts; a table that turns about a horizontal input axis has that axis, if nothing is stated.
+
+    `rate` is that of the table about the input axis, shape (n,).
+    """
+    if facts.table_axis is not None or facts.input_axis in (None, "up", "down") or not rate.any():
+        return facts
+    axis = facts.input_axis
+    table = Direction(heading=axis.heading) if isinstance(axis, Heading) else axis
+    return facts.model_copy(update={"table_axis": table})
+
+
+def reference_deg_h(facts: Facts, rate: FloatArray, angle: FloatArray | None) -> FloatArray:
+    """Rate about the input axis [deg/h], shape (n,): the table's and, where facts tell it, the Earth's.
+
+    Parameters
+    ----------
+    facts
+        Attitude and latitude; the attitude is that at table angle 0.
+    rate
+        Of the table about the input axis [deg/s], shape (n,).
+    angle
+        Of the table [deg], shape (n,), which carries the input axis round; None where not recorded.
+    """
+    earth = facts.earth_rate_deg_h
+    if angle is not None and earth is not None:
+        held = attitude(with_table_axis(facts, rate))
+        a, b, c = turned(earth_rate(facts), held.z, held.table)
+        if not held.fixed and (b or c):
+            from fogml.signals.bases import sine
+
+            def reference(rate: FloatArray, angle: FloatArray) -> FloatArray:
+                turns = held.sense / 360.0 * angle
+                return np.asarray(3600.0 * rate + a + b * sine(turns + 0.25) + c * sine(turns))
+
+            return large.each(reference, rate, angle)
+    return large.each(lambda rate: 3600.0 * rate + (earth or 0.0), rate)
 
 
 def earth_field(
