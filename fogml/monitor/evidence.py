@@ -30,8 +30,8 @@ class ChangePrior:
     Attributes
     ----------
     baseline_runs
-        Runs before the first that a change can begin with: a deviation needs two, and with three its
-        estimate is no longer off by orders of magnitude.
+        Runs before any change can show: a deviation needs two, and with three its estimate is no longer off
+        by orders of magnitude. It may have begun with any of them but the first.
     sizes
         Deviations that a step's size may have, or what a run alone is off by, in deviations of the figure
         between runs; equally likely. In octaves from what hides between runs to what nobody overlooks.
@@ -103,8 +103,8 @@ class FigureEvidence:
     Attributes
     ----------
     logs
-        Log evidence by onset (each told run after the baseline that enough have followed) and shape, shape
-        (m, 2); (0, 2) before.
+        Log evidence by onset (each told run but the first that enough have followed) and shape, shape (m, 2);
+        (0, 2) until there are more runs than the baseline's.
     alone
         Log evidence that a run alone is off, by told run that enough have followed, shape (k,).
     """
@@ -168,8 +168,8 @@ class FigureEvidence:
         """What each run adds to all: itself alone, a step and a ramp from it on; shape (n, 3 n)."""
         n = len(self._y)
         onsets = np.arange(n, dtype=np.intp)
-        # No change begins with the first runs.
-        changes = [self._shape(onsets, s) * (onsets >= self._baseline) for s in range(len(SHAPES))]
+        # No change begins with the first run: there is none before it.
+        changes = [self._shape(onsets, s) * (onsets > 0) for s in range(len(SHAPES))]
         return np.stack([np.eye(n), *changes], axis=-1).reshape(n, -1)
 
     def _judge(self) -> None:
@@ -233,15 +233,15 @@ class FigureEvidence:
             known = slice(0, _KINDS * onsets)
             logs = self._all[self._done - 1, known].reshape(-1, _KINDS)
             before = self._all[self._done - 1 - self._unconfirmed : self._done - 1, known]
-            self.alone, logs = logs[:, 0], logs[self._baseline :, 1:] - np.log(len(SHAPES))
+            self.alone, logs = logs[:, 0], logs[1:, 1:] - np.log(len(SHAPES))
             if len(before):
-                before = before.min(axis=0).reshape(-1, _KINDS)[self._baseline :, 1:] - np.log(len(SHAPES))
+                before = before.min(axis=0).reshape(-1, _KINDS)[1:, 1:] - np.log(len(SHAPES))
                 logs = np.where(before > 0.0, logs, np.minimum(logs, 0.0))
             self.logs = logs
 
     def onset(self, change: int) -> int:
         """Index of the run that a change begins with."""
-        return int(self._rows[self._baseline + change])
+        return int(self._rows[1 + change])
 
     def run(self, told: int) -> int:
         """Index of a told run."""
@@ -253,7 +253,7 @@ class FigureEvidence:
 
     def size_quantiles(self, levels: tuple[float, ...], shape: int) -> list[float]:
         """Quantiles of a change's size: for each covariance and each onset by least squares, weighed."""
-        onsets = np.arange(self._baseline, self._done - self._unconfirmed)
+        onsets = np.arange(1, self._done - self._unconfirmed)
         found = self._quantiles(levels, self._shape(onsets, shape), self._sizes[1 + shape])
         age, t = self._age[: self._done], self._t[: self._done]
         unit = float(np.ptp(age) / np.ptp(t)) if shape == 1 and np.ptp(age) > 0.0 else 1.0

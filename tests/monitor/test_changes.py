@@ -50,7 +50,7 @@ def test_the_statistic_is_the_sum_of_ratios_of_marginal_likelihoods(ages):
     covariances = [np.diag(w + (1 - w) * relative) + q * wander for w in (0.3, 1.0) for q in (0.0, 0.5)]
     for n in (5, 8):
         logs = []
-        for onset in range(3, n - 1):  # the last run alone confirms nothing
+        for onset in range(1, n - 1):  # the last run alone confirms nothing
             step = (np.arange(n) >= onset).astype(float)
             ramp = np.where(np.arange(n) >= onset, (ages[:n] - ages[onset - 1]) / interval, 0.0)
 
@@ -99,6 +99,20 @@ def test_a_bad_run_is_told_and_hides_no_later_change(bad):
     assert sum(held) >= 4
 
 
+@pytest.mark.parametrize("first", [0, 7])
+def test_two_bad_runs_are_changes_there_and_back_and_hide_no_later_one(first):
+    """As the first runs since an alarm, or of all, they hid steps a third as large for a dozen runs."""
+    ages, errors, raised = np.arange(26.0), {"level": np.full(26, 0.3)}, []
+    for seed in range(5):
+        level = np.random.default_rng([13, seed]).normal(size=26) + 10.0 * (ages >= 20.0)
+        level[first : first + 2] += 30.0
+        changes = change_chart({"level": level}, ages, 300.0, errors=errors).changes
+        assert [change.onset for change in changes[-2:]] == [first + 2, 20]
+        assert changes[-2].size == pytest.approx(-30.0, abs=3.0)
+        raised.append(changes[-1].raised_at)
+    assert np.median(raised) <= 22
+
+
 def test_a_step_is_no_run_alone_and_normal_runs_are_none():
     alone = 0
     for seed in range(15):
@@ -127,7 +141,7 @@ def test_after_a_change_constants_and_lines_are_as_likely_from_the_first_runs_on
             total += sum(_marginal(y, column, size, c, line) for c in spread) / first
         return total
 
-    for place, onset in enumerate((4, 5)):
+    for place, onset in enumerate(range(1, 6)):
         step = (np.arange(7) >= onset).astype(float)
         ramp = np.where(np.arange(7) >= onset, t - t[onset - 1], 0.0)
         ratios = [likelihood(step, 3.0), likelihood(ramp, 0.5)] / likelihood(step, 0.0) / 2.0
