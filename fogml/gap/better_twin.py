@@ -24,6 +24,7 @@ from fogml.signals.noise_expectation import floor_square
 from fogml.twin.draws import parameter_values
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.plant.fit import PlantFit, fit_plant
+from fogml.twin.plant.standard import QUANTITIES
 from fogml.twin.registry import effect
 from fogml.twin.twin import Twin
 from fogml.twin.uncertainty import Suspected, Uncertainty
@@ -120,8 +121,9 @@ def better_twin(
         names += fitted.names
         matrices.append(fitted.covariance * np.outer(scale, scale))
         deviations = scale * np.sqrt(np.diag(fitted.covariance))
+        units = {f"plant.{quantity.name}": quantity.unit for quantity in QUANTITIES}
         sizes = ", ".join(
-            f"{name.removeprefix('plant.')} {short(value)} ± {short(sd, 2)}"
+            f"{name.removeprefix('plant.')} {short(value)} ± {short(sd, 2)} {units.get(name, '')}".rstrip()
             for name, value, sd in zip(fitted.names, scale, deviations)
         )
         told.append(f"Plant fitted to recorded temperatures: {sizes}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.intervals import Z90
-from fogml.numerals import percent, short
+from fogml.numerals import percent, plural, short
 from fogml.runs.noise_series import HOLD_ROWS, NoiseSeries
 from fogml.runs.run import Run
 from fogml.runs.steps import hardly_moved, recorded_step
@@ -22,6 +22,8 @@ DOUBT = 1e-3
 """Chance of a warning that a right model, or a steady run, gets."""
 ROUNDED = 0.01
 """Share of N that rounding makes from which it is told."""
+SLOW_FILTER = 0.1
+"""Share of the longest run: terms behind a filter that hold from later on are of a drift (filters take s)."""
 MOST_LINES = 5
 """Sinusoids that are listed."""
 _URAD = np.pi / 180.0 / 3600.0 * 1e6
@@ -107,11 +109,17 @@ def words_of(terms: NoiseTerms, series: NoiseSeries, runs: Sequence[Run]) -> lis
             f"The output is filtered ({told['words']}{corner}): terms are of the noise ahead of the filter, "
             f"and the Allan deviation shows them from {short(max(terms.holds_from_s, series.new_s))} s on."
         )
+        longest = max(float(np.ptp(run.time)) for run in runs)
+        if terms.holds_from_s > SLOW_FILTER * longest:
+            words.append(
+                "No gyro's filter is that slow against its run: the output drifts, as with a temperature "
+                "that is not recorded, and N is that drift's. Record the temperature, or keep it constant, for N."
+            )
     gaps = gaps_of(runs)
     if gaps["count"]:
         words.append(
-            f"{gaps['count']} gaps ({short(gaps['lost_s'], 4)} s lost): no average and no difference "
-            "crosses one."
+            f"{plural(gaps['count'], 'gap')} ({short(gaps['lost_s'], 4)} s lost): no average and no "
+            "difference crosses one."
         )
     return words
 

@@ -244,6 +244,13 @@ def test_the_noise_page_tells_terms_and_warnings() -> None:
     assert "overlapping" in text
 
 
+def test_a_deviation_of_nothing_is_no_empty_figure() -> None:
+    values = noise_values()
+    still = {**values, "adev": [0.0] * len(values["adev"]), "ci": [[0.0, 0.0]] * len(values["adev"])}
+    html = noise_page(still)
+    assert "nothing to draw" in html and "plotly" not in html
+
+
 def test_without_overlap_the_noise_page_says_so() -> None:
     text = Page(noise_page({**noise_values(), "overlapping": False})).text
     assert "not overlapping" in text and "rest on few pairs" in text

@@ -224,7 +224,26 @@ def test_each_value_four_times_and_a_filtered_output():
     modelled, ahead = (np.array(filtered["model"][key]) for key in ("adev", "ahead_of_filter"))
     assert modelled[0] == pytest.approx(filtered["adev"][0], rel=0.1) and modelled[0] < 0.3 * ahead[0]
     assert any("The output is filtered" in note for note in filtered["notes"])
+    assert not any("the output drifts" in note for note in filtered["notes"])
     json.dumps(filtered, allow_nan=False)
+
+
+def test_a_drift_that_is_taken_for_noise_behind_a_slow_filter_is_told():
+    """Ramps of temperature that are not recorded: white noise of 0.05 deg/h a sample, drift of 2 deg/h."""
+    time = 4.0 * np.arange(5400)
+    at = np.array([0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0]) * time[-1]
+    outside = np.interp(time, at, [25.0, 25.0, 60.0, 60.0, -40.0, -40.0, 25.0])
+    lag = np.exp(-4.0 / 600.0)
+    inside = lfilter([1.0 - lag], [1.0, -lag], outside - 25.0) + 25.0
+    drift = 0.02 * (inside - 25.0) + 0.0004 * (inside - 25.0) ** 2 + 0.05 * (outside - inside)
+    gyro = 8.0 + drift + 0.05 * np.random.default_rng(1).normal(size=len(time))
+    told = noise_report(Run("cycle.csv", {"time": time, "gyro": gyro}))
+    of_noise = 0.05 * np.sqrt(4.0) / 60.0
+    right = told["terms"]["N"]["value"] == pytest.approx(of_noise, rel=0.1)
+    assert right or any("the output drifts" in note for note in told["notes"])
+    recorded = noise_report(Run("cycle.csv", {"time": time, "gyro": gyro, "T_in": inside, "T_out": outside}))
+    assert recorded["terms"]["N"]["value"] == pytest.approx(of_noise, rel=0.1)
+    assert not any("the output drifts" in note for note in recorded["notes"])
 
 
 def test_a_hold_counts_in_stretches_too_short_to_tell_it():
@@ -261,6 +280,8 @@ def test_noise_that_changes_and_gaps_are_told():
     assert report["stationarity"]["thirds"][0] < report["stationarity"]["thirds"][2]
     gapped = noise_report(run.with_columns(time=run.time + np.repeat([0.0, 50.0, 400.0], 10_000)))
     assert gapped["gaps"] == {"count": 2, "lost_s": pytest.approx(400.0)}
+    once = noise_report(run.with_columns(time=run.time + np.repeat([0.0, 0.0, 400.0], 10_000)))
+    assert any(note.startswith("1 gap (") for note in once["notes"])
 
 
 @pytest.mark.parametrize("recorded", [True, False])
