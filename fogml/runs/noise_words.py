@@ -113,7 +113,7 @@ def words_of(terms: NoiseTerms, series: NoiseSeries, runs: Sequence[Run]) -> lis
         if terms.holds_from_s > SLOW_FILTER * longest:
             words.append(
                 "No gyro's filter is that slow against its run: the output drifts, as with a temperature "
-                "that is not recorded, and N is that drift's. Record the temperature, or keep it constant, for N."
+                "that is not recorded, and N is that drift's. For N record it, or keep it constant."
             )
     gaps = gaps_of(runs)
     if gaps["count"]:
