@@ -146,9 +146,9 @@ class RateRamp(NoiseEffect):
 
         y = R t,      sigma(tau) = R tau / sqrt(2)
 
-    with t in hours, from the first sample on. It is the same in every run, and so in a
-    replay. A thermal ramp that is left looks exactly like it: not to
-    be read from a run whose temperature moves.
+    with t in hours from the first sample on, of the first run where runs of a unit follow one another. It is
+    the same each time, and so in a replay. A thermal ramp that is left looks exactly like it: not to be read
+    from a run whose temperature moves.
 
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
     """
