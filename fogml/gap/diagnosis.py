@@ -266,7 +266,7 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
                 lies.segments,
                 any(found.kind(m) == "plant" for m in likeliest),
             ),
-            *doubts(found, noise, part),
+            *doubts(found, recalibrated, noise, part),
         ),
     )
 

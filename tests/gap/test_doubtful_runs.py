@@ -6,7 +6,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from fogml.gap.doubtful_runs import other_way
 from fogml.gap.reports import assumed
 from fogml.runs.checks import check_run
 from fogml.runs.run import Run
@@ -27,3 +29,23 @@ def said(temperature: Any) -> str:
 def test_what_makes_every_figure_wrong_is_said_first() -> None:
     assert said(lambda time: 293.15 + time / 200.0).startswith("hot.csv: 'T' is stated in degC")
     assert said(lambda time: 20.0 + time / 200.0).startswith("Runs were brought to means")
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        (1.0, ""),
+        (0.4, ""),
+        (-0.1, ""),
+        (0.0, ""),
+        (-1.1, "a sign may be wrong"),
+        (1.0 / 3600.0, "3600 times less than was recorded: a unit may be wrong"),
+        (-206264.8, "times more and of the other sign than was recorded"),
+    ],
+)
+def test_a_replay_of_another_sign_or_unit_is_told(times: float, said: str) -> None:
+    rng = np.random.default_rng(3)
+    drift = [np.cumsum(rng.standard_normal(400)) for _ in range(2)]
+    recorded = [d + rng.normal(9.0, 0.5, 400) for d in drift]
+    told = other_way(recorded, [times * d + 4.0 for d in drift])
+    assert said in told and bool(told) == bool(said)
