@@ -164,8 +164,10 @@ def _print_run(run: dict[str, Any], terminal: Terminal) -> None:
         terminal.say(
             f"gaps: {gaps['count']}, the longest {duration(gaps['longest_s'])}, {gaps['stretches']} stretches"
         )
+    # Without temperatures no stay is known to be a soak.
+    stay = "soak" if run["temperatures"] else "at rest"
     spent = [
-        f"{name.replace('_', ' ')} {duration(time)}"
+        f"{stay if name == 'soak' else name.replace('_', ' ')} {duration(time)}"
         for name, time in run["regimes"]["seconds"].items()
         if time
     ]

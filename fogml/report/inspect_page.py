@@ -72,7 +72,7 @@ def _verdict(told: Mapping[str, Any]) -> str:
     seconds = told["regimes"]["seconds"]
     total = sum(seconds.values())
     spent = [
-        f"{regime_word(name)} {percent(seconds[name] / total)}"
+        f"{_stay_word(name, bool(spans))} {percent(seconds[name] / total)}"
         for name in in_order(name for name, time in seconds.items() if time and total)
     ]
     parts = [f"{plural(told['rows'], 'sample')} over {duration(told['span_s'])}"]
@@ -83,6 +83,11 @@ def _verdict(told: Mapping[str, Any]) -> str:
     return (
         "; ".join(parts) + ". " + (f"{plural(found, 'finding')} below." if found else "Nothing was noticed.")
     )
+
+
+def _stay_word(regime: str, with_temperature: bool) -> str:
+    """A regime in words; without temperatures no stay is known to be a soak."""
+    return regime_word(regime) if with_temperature or regime != "soak" else "at rest"
 
 
 def _tiles(told: Mapping[str, Any]) -> list[Tile]:
@@ -135,7 +140,7 @@ def _regimes(segments: Sequence[Mapping[str, Any]]) -> Table | None:
     rows = []
     for segment in segments:
         cells = [
-            regime_word(segment["regime"]),
+            _stay_word(segment["regime"], with_temperature),
             stated(round(segment["from_s"], 3)),
             stated(round(segment["to_s"], 3)),
             duration(segment["to_s"] - segment["from_s"]),
@@ -253,9 +258,10 @@ def temperature_rates(run: Run) -> dict[str, tuple[FloatArray, FloatArray, Index
 
 
 def regime_segments(run: Run, per_unit: float) -> list[Segment]:
-    """The regimes of a run on a time axis of so many seconds per unit."""
+    """The regimes of a run on a time axis of so many seconds per unit; no soaks without temperatures."""
     last = len(run) - 1
     return [
         (name, float(run.time[start]) / per_unit, float(run.time[min(stop, last)]) / per_unit)
         for name, start, stop in regimes(run).segments()
+        if run.temperature_columns or name != "soak"
     ]

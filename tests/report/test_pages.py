@@ -265,7 +265,8 @@ def test_the_inspect_page_tells_gaps_findings_and_columns() -> None:
 
 def test_a_run_without_temperature_can_be_inspected() -> None:
     run = Run.from_columns("static.csv", time=np.arange(500.0), gyro=np.sin(np.arange(500.0)))
-    assert "no temperature recorded" in Page(inspect_page(run)).text
+    text = Page(inspect_page(run)).text
+    assert "no temperature recorded; at rest 100 %" in text and "soak" not in text
 
 
 def test_long_runs_are_drawn_with_few_points() -> None:
