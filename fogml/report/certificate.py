@@ -19,6 +19,7 @@ from fogml.report.page import render
 from fogml.report.style import time_unit
 from fogml.report.tables import Table, reference_of
 from fogml.report.verdict import (
+    GRADES,
     advice_words,
     floor_told,
     model_card,
@@ -96,10 +97,12 @@ def _sheet(judgement: Judgement) -> dict[str, Any]:
     shown = sorted(judgement.test, key=lambda run: -run.after.rms)[:_MOST_RUNS]
     figure, words = _figure(worst)
     card = dict(model_card(judgement.model, _MOST_FEATURES))
+    advice = advice_on(judgement)
+    kind, sign, grade = GRADES[advice.grade]
     about = [
         ("Model", f"{card['kind']}" + (f" of {card['features']}" if "features" in card else "")),
         ("Size", ", ".join(_size(card))),
-        ("Verdict", advice_words(advice_on(judgement))["words"]),
+        ("Verdict", advice_words(advice)["words"]),
         *([("Trained within", card["trained within"])] if "trained within" in card else []),
         ("Trained on", listed([run.run for run in judgement.train], 6)),
         ("Attitude", _attitude(worst)),
@@ -112,6 +115,8 @@ def _sheet(judgement: Judgement) -> dict[str, Any]:
         "unit": worst.unit or _NOT_STATED,
         "axis": worst.axis or _NOT_STATED,
         "met": judgement.met,
+        # Limits that are met don't make good what else is wrong.
+        "mark": None if advice.grade == "use" else {"kind": kind, "sign": sign, "words": grade},
         "unseen": unseen(judgement),
         "limits": stated_limits(judgement),
         "about": about,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from datetime import UTC, date, datetime
@@ -75,6 +76,16 @@ def test_runs_seen_in_training_are_not_called_unseen() -> None:
     assert "on runs that the model has not seen" in Page(certificate(judgement())).text
     text = Page(certificate(judgement(findings=(seen,)))).text
     assert "has not seen" not in text and "on runs that hold training samples" in text
+
+
+def test_limits_that_are_met_by_a_model_not_to_be_used_do_not_stand_alone() -> None:
+    """A certificate of met limits alone reads as a pass, whatever its verdict says."""
+    seen = Finding("seen_in_training", "holds the same samples as training run a.csv")
+    title = re.compile("<h1>(.*?)</h1>", re.DOTALL)
+    (good,) = title.findall(certificate(judgement()))
+    (doubtful,) = title.findall(certificate(judgement(findings=(seen,))))
+    assert "all limits met" in good and "all limits met" in doubtful
+    assert "Do not use" in doubtful and "use" not in good
 
 
 def test_the_figure_is_light_well_formed_svg() -> None:
