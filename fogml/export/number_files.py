@@ -18,6 +18,7 @@ from fogml.export.plan import Plan
 from fogml.export.storage import Stored, arrays_to_write
 from fogml.features.atoms import DEAD_BAND
 from fogml.features.operators import REACH, TAKEN, Window
+from fogml.runs.column_files import take_out_date
 from fogml.strict import as_written
 
 SCHEMA = "fogml.weights/1"
@@ -153,6 +154,7 @@ def write_mat(
         "arrays": arrays,
     }
     savemat(folder / MAT_FILE, {"fogml": fields}, oned_as="row")
+    take_out_date(folder / MAT_FILE)
 
 
 def read_mat(folder: Path, plan: Plan) -> Plan:

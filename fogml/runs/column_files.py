@@ -174,6 +174,12 @@ def _chosen(
     return vectors, (*findings, Finding("other_columns", told, count=len(unread)))
 
 
+def take_out_date(path: Path) -> None:
+    """Take the time of writing out of a new MATLAB file of version 5: the same content has the same bytes."""
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 5.0 MAT-file, Platform: fogml, Created on: unknown".ljust(116))
+
+
 def write_mat(
     run: Run, cells: dict[str, str], path: Path, version: Literal["5", "7.3"] | None = None
 ) -> None:
@@ -200,6 +206,7 @@ def write_mat(
 
         vectors: dict[str, Any] = {label: run.columns[name][:, None] for name, (label, _) in labels.items()}
         savemat(path, {**vectors, "units": units, "facts": facts}, long_field_names=True, do_compression=True)
+        take_out_date(path)
         return
     with _h5py_module().File(path, "w", userblock_size=USER_BLOCK, track_order=True) as file:
         for name, (label, _) in labels.items():

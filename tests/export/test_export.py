@@ -83,6 +83,17 @@ def test_number_files_hold_the_model(model_of, tmp_path, name, to, dtype):
     assert report["files"] == sorted([*files[to], "fogml_model.txt"])
 
 
+@pytest.mark.parametrize("to", ["c", "json", "mat", "onnx"])
+def test_the_same_export_later_has_the_same_bytes(model_of, tmp_path, monkeypatch, to):
+    exports = []
+    for when in ("Mon Jan  1 00:00:00 2024", "Tue Feb  6 11:12:13 2029"):
+        monkeypatch.setattr("time.asctime", lambda when=when: when)
+        (folder := tmp_path / when[:3]).mkdir()
+        export_model(model_of("polynomial"), folder, ExportSettings(to))
+        exports.append({path.name: path.read_bytes() for path in folder.iterdir()})
+    assert exports[0] == exports[1]
+
+
 def by_hand(held, arrays, atoms, gyro):
     """Value of a file's numbers at limited atoms (n, a), by what it says of formula, edge and composition."""
     columns = []

@@ -103,6 +103,7 @@ def test_matlab_5_as_scipy_reads_it(tmp_path):
 
     path = tmp_path / "run.mat"
     write_run(Run("run", {"time": np.arange(5.0), "gyro": np.ones(5)}, gyro_unit="count"), path)
+    assert path.read_bytes()[:116].decode().rstrip().endswith("Created on: unknown")
     held = loadmat(path, simplify_cells=True)
     np.testing.assert_array_equal(held["time"], np.arange(5.0))
     assert held["units"] == {"time": "s", "gyro": "count"}
