@@ -33,6 +33,14 @@ def test_turning_without_a_rate_is_told(span, columns):
     assert "10 deg/s off" in one.message
 
 
+def test_an_angle_alone_is_no_rate():
+    """The reference is of the column 'rate': without it a turn that the angle shows counts as drift."""
+    rate = turned(600.0, 900.0)
+    (one,) = found(REST + 3600.0 * rate, angle=np.cumsum(rate) * 0.5)
+    assert one.row == int(np.argmax(rate > 0.0)) + 1
+    assert found(REST + 3600.0 * rate, angle=np.cumsum(rate) * 0.5, rate=rate) == []
+
+
 def test_a_table_that_takes_its_time_is_told():
     ramp = np.clip(np.minimum(TIME - 600.0, 1200.0 - TIME), 0.0, 20.0)  # 1 deg/s2
     assert len(found(REST + 3600.0 * ramp)) == 1
@@ -57,7 +65,7 @@ def test_nothing_else_is_taken_for_turning():
         (REST + 3600.0 * rate, {"rate": rate}),
         # The log of the table's rate begins late and ends early by a second.
         (REST + 3600.0 * rate, {"rate": turned(601.0, 899.0)}),
-        (REST + 3600.0 * rate, {"angle": np.cumsum(rate) * 0.5}),
+        (REST + 3600.0 * rate, {"position": np.cumsum(rate) * 0.5}),
         (REST + drift, {}),
         (REST + shocks, {}),
         (40.0 * NOISE * 10.0, {}),
