@@ -63,11 +63,13 @@ def write(
     for axis, table in tables.items():
         name = CSV_FILE.replace(".csv", f"_{axis}.csv") if several else CSV_FILE
         (folder / name).write_text(_csv(table), encoding="ascii")
-    told = {axis: _told(table, losses[axis], dtype) for axis, table in tables.items()}
+    scaled = any(map(has_scale, tables.values()))
+    told = {axis: _told(table, losses[axis], dtype, scaled) for axis, table in tables.items()}
     document = {
         "schema": SCHEMA,
         "formula": FORMULA,
         "unit": "deg/h",
+        "scaled": any(map(has_scale, tables.values())),
         "matrix": None if matrix is None else matrix.tolist(),
         "axes": {
             axis: {
@@ -95,11 +97,10 @@ def has_scale(table: Segments) -> bool:
     return not bool(np.all(table.scale == 1.0))
 
 
-def _told(table: Segments, loss: Mapping[str, Any] | None, dtype: str) -> dict[str, Any]:
-    columns = 3 if has_scale(table) else 2
+def _told(table: Segments, loss: Mapping[str, Any] | None, dtype: str, scaled: bool) -> dict[str, Any]:
     return {
         "breakpoints": len(table.temperature),
-        "bytes": columns * len(table.temperature) * _BYTES[dtype],
+        "bytes": (3 if scaled else 2) * len(table.temperature) * _BYTES[dtype],
         "rms_difference_at_rest": table.rms,
         "largest_difference_at_rest": table.largest,
         "scale_factor_weighed_at_deg_s": table.rate_deg_s,
@@ -135,6 +136,7 @@ def _source(
         "card": card,
         "real": "float" if dtype == "float32" else "double",
         "zero": _literals([0.0], dtype)[0],
+        "scaled": any(map(has_scale, tables.values())),
         "matrix": None if matrix is None else [_literals(row, dtype) for row in matrix],
         "axes": {
             axis: {

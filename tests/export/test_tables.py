@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import json
+import re
 import shutil
 import subprocess
 
@@ -221,6 +222,16 @@ def test_an_axis_of_any_name_has_a_table_in_c(tmp_path, axis):
         export_tables([model], tmp_path, TableSettings("segments"))["axes"][axis]["c_largest_difference"]
         < 0.01
     )
+
+
+def test_the_bytes_stated_of_tables_are_those_of_the_numbers_in_c(axes, model_of, tmp_path):
+    joint = model_of("joint")
+    for place, models in enumerate(([model for model, _ in axes.values()], [joint])):
+        (folder := tmp_path / str(place)).mkdir()
+        report = export_tables(models, folder, TableSettings("segments", "float32"))
+        source = (folder / "fogml_segments.c").read_text()
+        arrays = re.findall(r"static const fogml_segments_real \w+\[(\d+)\]", source)
+        assert sum(told["bytes"] for told in report["axes"].values()) == 4 * sum(map(int, arrays))
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
