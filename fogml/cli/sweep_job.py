@@ -54,6 +54,19 @@ def _read(paths: tuple[str, ...], repair: Repairing, identities: list[Any]) -> l
     return runs
 
 
+def _check_same_gyro(runs: list[Run], test_runs: list[Run]) -> None:
+    """Refuse test runs of another gyro before the trials: the winner could not be judged on them."""
+    for fact in ("unit", "axis"):
+        trained = next((held for run in runs if (held := getattr(run.facts, fact)) is not None), None)
+        for run in test_runs:
+            found = getattr(run.facts, fact)
+            if None not in (found, trained) and found != trained:
+                raise InputError(
+                    f"{run.name}: {fact} '{found}', but the training runs are of {fact} '{trained}'; "
+                    f"name test runs of this {fact}"
+                )
+
+
 def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
     """Run the trials that are missing, judge the winner once on the test runs, write the results."""
     from fogml.report.sweep_page import pareto_table, sweep_page, verdict_sentences
@@ -62,6 +75,7 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
     tracker = None if settings.track is None else Tracker(settings.track, "fogml sweep", terminal.note)
     runs = open_runs(settings.runs, terminal, repair=settings.repair, beside=settings.test)
     test_runs = open_runs(settings.test, terminal, repair=settings.repair, beside=settings.runs)
+    _check_same_gyro(runs, test_runs)
     with terminal.work("sweeping", total=settings.trials) as work:
         study = run_sweep(
             plan_of(settings, runs),

@@ -98,6 +98,14 @@ def test_bad_sweeps(invoke, sweep_config, tmp_path, change, message):
     assert not (tmp_path / "out" / "sweep.json").exists()
 
 
+def test_a_test_run_of_another_unit_is_refused_before_the_trials(invoke, sweep_config, tmp_path):
+    write_run(tmp_path / "c.csv", "FOG-2", 2, slope=0.05, cycles=1.6, rows=400)
+    told = invoke("sweep", sweep_config, status=2).stderr
+    assert "c.csv: unit 'FOG-2', but the training runs are of unit 'FOG-1'" in told
+    assert "any-unit" not in told and "tried" not in told
+    assert not (tmp_path / "out" / "study.journal").exists()
+
+
 def test_a_study_of_another_space_is_refused(invoke, sweep_config):
     invoke("sweep", sweep_config, "--trials", 2, "--quiet")
     values = yaml.safe_load(sweep_config.read_text())
