@@ -14,6 +14,7 @@ from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError, counted
 from fogml.numerals import short
 from fogml.runs.findings import DEAD, SATURATION, Finding, dead_words
+from fogml.runs.lateness import late_rate
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import HOUR_S, implausible
 from fogml.runs.run import Run
@@ -63,6 +64,8 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         there; not where a quiet output rests at other values as well.
     ``coarse_output``
         The output is rounded to steps that its noise does not fill (`coarse_output`).
+    ``late_rate``
+        The output follows steps of the recorded rate a second or more late or early (`late_rate`).
     ``outliers``
         Gyro samples over 8 robust sigma off the median of the five about them (`find_outliers`).
     ``small_temperature_span``
@@ -81,6 +84,7 @@ def check_run(run: Run) -> tuple[Finding, ...]:
         _dead,
         _saturated,
         coarse_output,
+        late_rate,
         _outliers,
         _span,
     )

@@ -19,6 +19,7 @@ FIRST_OF_ALL = (
     "implausible_earth_rate",
     "implausible_scale_factor",
     "implausible_rest",
+    "late_rate",
     "temperature_dropouts",
     "marks_of_thousands",
 )

@@ -87,4 +87,5 @@ def test_a_record_read_backwards_has_the_same_course() -> None:
     time = np.append(0.0, 25.0 + 10.0 * np.arange(11.0))
     values = 0.5 * np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.0, 0.0])
     backwards = course_through_steps(time[-1] - time[::-1], values[::-1], 0.5)
-    assert backwards[::-1] == pytest.approx(course_through_steps(time, values, 0.5), abs=1e-9)
+    # Whose rounding libraries for linear algebra do differently.
+    assert backwards[::-1] == pytest.approx(course_through_steps(time, values, 0.5), abs=1e-7)
