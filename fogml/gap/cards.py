@@ -112,12 +112,16 @@ def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, An
         return _drawn(declared, told, field, beside)
     angles = [q.name for q in declared.shape if q.all_round]
     optima: list[Optimum] = []
+    places: list[str] = []
     root = Root(beside)
     for place, amplitude, shape in _starts(declared, field, beside, told):
         found = optimum([Form(declared, field, amplitude, shape, place)], root)
-        # Two that make the same of the runs, to less than noise, are one.
-        if all(float(np.linalg.norm(found.made - other.made)) > 1.0 for other in optima):
+        # Two of one place that make the same of the runs, to less than noise, are one. Of two places that do,
+        # with other shapes, these runs can't say which it is.
+        alike = (other for other, at in zip(optima, places) if at == place)
+        if all(float(np.linalg.norm(found.made - other.made)) > 1.0 for other in alike):
             optima.append(found)
+            places.append(place)
     _, usual = declared.amplitude.range(scene.grade)
     every = [found.effects[0] for found in optima]
     sizes = np.array([one.amplitude for one in every])

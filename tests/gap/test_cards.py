@@ -110,3 +110,31 @@ def test_turn_on_bias_is_the_deviation_of_constants_whatever_is_common_to_them(c
     assert card.value.amplitude == pytest.approx(sizes.std(ddof=1), rel=1e-3)
     # Of so few the deviation is known by the chi distribution.
     assert card.amplitude_se == pytest.approx(sizes.std(ddof=1) / np.sqrt(2.0 * 3.0), rel=0.01)
+
+
+def _play(course, width):
+    held, out = course[0], np.empty(len(course))
+    for i, value in enumerate(course):
+        held = out[i] = min(max(held, value - width), value + width)
+    return out
+
+
+def test_a_shape_is_as_unsure_as_the_place_that_it_is_of():
+    """Which face drives a weak hysteresis these runs can't say; its width is another by each."""
+    time = 60.0 * np.arange(900)
+    outer = 20.0 + 35.0 * np.sin(2.0 * np.pi * time / 16000.0) + 8.0 * np.sin(2.0 * np.pi * time / 43000.0)
+    inner = np.interp(time - 700.0, time, outer)
+    run = Run.from_columns("a", time=time, gyro=np.zeros(len(time)), T_in=inner, T_out=outer)
+    noise = NoiseModel(0.02, 0.0, 0.0)
+    field = foreseen(TwinModel(load_twin("nominal")), [run], noise, STANDARD).field
+    rows = field.setting.scene.runs[0]
+    off = []
+    for seed in range(8):
+        for share in (0.0, 0.5, 1.0):
+            course = np.interp(rows.time_s, time, (1.0 - share) * inner + share * outer)
+            made = 0.006 * (_play(course, 9.0) - course)
+            data = field.whitening.stacked([made])
+            data = data + np.random.default_rng(seed).standard_normal(len(data))
+            card = card_of("thermal_hysteresis", field, replace(field.base, data=data), {})
+            off.append((card.value.shape["half_width"] - 9.0) / card.shape_se["half_width"])
+    assert np.mean(np.abs(off) < 1.645) >= 0.8
