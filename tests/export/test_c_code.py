@@ -282,6 +282,20 @@ def test_no_reading_holds_the_last_drift_and_a_false_first_one_is_replaced(model
     np.testing.assert_array_equal(late[3:], out[3:])
 
 
+@pytest.mark.parametrize(
+    ("text", "refused", "held"),
+    [("T, lag(T, 3600 s)", ["float32"], "q31"), ("T, dT[exp, 3600 s]", ["float32", "q31"], "float64")],
+)
+def test_a_memory_that_rounding_eats_is_refused(text, refused, held):
+    """At 2 kHz a lag in float32 is 0.8 degC off after 3000 s of a ramp, where 0.05 were stated."""
+    model = make_model("polynomial", features=text).fit(made_run(1, 1.0))
+    for dtype in refused:
+        with pytest.raises(InputError, match="--dtype float64.*--sample-s 0.0018 or more"):
+            c_source(Plan.of(model, 5e-4), dtype, [])
+    for dtype, sample_s in ((held, 5e-4), ("float64", 5e-4), ("float32", 0.0018)):
+        c_source(Plan.of(model, sample_s), dtype, [])
+
+
 @pytest.mark.parametrize("dtype", ["float64", "q31"])
 def test_before_any_reading_the_drift_is_that_of_the_middle_of_the_trained_box(tmp_path, dtype):
     """In counts of 1/40 deg/h, too: an output is never a count by the name of a rate."""
