@@ -241,8 +241,8 @@ def _check_rounding(
     if coarse and window.method == "exp" and window.length_s > most * sample_s:
         least_s = 1.06 * window.length_s / most
         raise InputError(
-            f"export: with a time constant of {window.length_s:g} s a sample {sample_s:g} s later moves it by "
-            "less than float32 or fixed point tells; use --dtype float64, or call the code less often and "
+            f"export: with a time constant of {window.length_s:g} s a sample {sample_s:g} s on moves it "
+            "by less than float32 or fixed point tells; use --dtype float64, or call the code less often and "
             f"state that, --sample-s {least_s:.2g} or more"
         )
 

@@ -290,7 +290,7 @@ def test_a_memory_that_rounding_eats_is_refused(text, refused, held):
     """At 2 kHz a lag in float32 is 0.8 degC off after 3000 s of a ramp, where 0.05 were stated."""
     model = make_model("polynomial", features=text).fit(made_run(1, 1.0))
     for dtype in refused:
-        with pytest.raises(InputError, match="--dtype float64.*--sample-s 0.0018 or more"):
+        with pytest.raises(InputError, match=r"--dtype float64.*--sample-s 0\.0018 or more"):
             c_source(Plan.of(model, 5e-4), dtype, [])
     for dtype, sample_s in ((held, 5e-4), ("float64", 5e-4), ("float32", 0.0018)):
         c_source(Plan.of(model, sample_s), dtype, [])
