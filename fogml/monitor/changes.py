@@ -150,7 +150,7 @@ def change_chart(
 ) -> Chart:
     """The evidence that figures of consecutive runs changed.
 
-    Takes O(n**3) time and O(n**2) memory for n runs: two minutes and 0.7 GB for four figures of 1500.
+    Takes O(n**3) time and O(n**2) memory for n runs: three minutes and 0.8 GB for four figures of 1500.
 
     Parameters
     ----------
