@@ -69,7 +69,7 @@ def write(
         "schema": SCHEMA,
         "formula": FORMULA,
         "unit": "deg/h",
-        "scaled": any(map(has_scale, tables.values())),
+        "scaled": scaled,
         "matrix": None if matrix is None else matrix.tolist(),
         "axes": {
             axis: {

@@ -12,11 +12,11 @@ from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.noise import not_static
 from fogml.numerals import percent, short
+from fogml.runs.plausible import FACTORS
 from fogml.runs.run import Run
 from fogml.signals.shared import shared_samples
 
-UNITS = (3600.0, 206264.806)
-"""What is in deg/s or rad/s is less by this than in deg/h."""
+_UNITS = (FACTORS["deg/h taken for deg/s"], FACTORS["deg/h taken for rad/s"])
 
 
 def doubts(found: Inference, recalibrated: Foretold, noise_run: Run | None, part: bool) -> tuple[str, ...]:
@@ -62,7 +62,7 @@ def other_way(
         return ""
     times = (squares[0] / squares[1]) ** 0.5
     sign = "of the other sign" if correlation < 0.0 else ""
-    if any(1.0 / factor < ratio < factor for unit in UNITS for ratio in (times / unit, times * unit)):
+    if any(1.0 / factor < ratio < factor for unit in _UNITS for ratio in (times / unit, times * unit)):
         how = f"about {short(max(times, 1.0 / times), 2)} times {'less' if times > 1.0 else 'more'}"
         return f"{how}{f' and {sign}' if sign else ''} than was recorded: a unit may be wrong"
     if sign and 1.0 / factor < times < factor:

@@ -53,13 +53,13 @@ def late_rate(
     """
     if "rate" not in run.columns:
         return
+    starts, stops = _changes(run.rate)
+    if len(starts) < 2:
+        return
     try:
         gyro = run.gyro_deg_h
     except InputError:
         return  # counts whose scale factor is not stated
-    starts, stops = _changes(run.rate)
-    if len(starts) < 2:
-        return
     before, after = np.append(0, stops[:-1]), np.append(starts[1:], len(run))
     heights = np.abs(run.rate[np.minimum(stops, len(run) - 1)] - run.rate[starts - 1])
     least = max(LEAST_RATE_DEG_S, noises * white_noise(gyro[: 1 << 16]) / 3600.0)

@@ -12,6 +12,7 @@ from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin_file import load_twin
+from tests.play_operator import play
 
 
 @pytest.fixture(scope="module")
@@ -112,13 +113,6 @@ def test_turn_on_bias_is_the_deviation_of_constants_whatever_is_common_to_them(c
     assert card.amplitude_se == pytest.approx(sizes.std(ddof=1) / np.sqrt(2.0 * 3.0), rel=0.01)
 
 
-def _play(course, width):
-    held, out = course[0], np.empty(len(course))
-    for i, value in enumerate(course):
-        held = out[i] = min(max(held, value - width), value + width)
-    return out
-
-
 def test_a_shape_is_as_unsure_as_the_place_that_it_is_of():
     """Which face drives a weak hysteresis these runs can't say; its width is another by each."""
     time = 60.0 * np.arange(900)
@@ -132,7 +126,7 @@ def test_a_shape_is_as_unsure_as_the_place_that_it_is_of():
     for seed in range(8):
         for share in (0.0, 0.5, 1.0):
             course = np.interp(rows.time_s, time, (1.0 - share) * inner + share * outer)
-            made = 0.006 * (_play(course, 9.0) - course)
+            made = 0.006 * (play(course, 9.0) - course)
             data = field.whitening.stacked([made])
             data = data + np.random.default_rng(seed).standard_normal(len(data))
             card = card_of("thermal_hysteresis", field, replace(field.base, data=data), {})

@@ -16,6 +16,7 @@ from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin_file import load_twin
+from tests.play_operator import play
 
 
 def test_values_are_what_each_cause_adds_on_average_over_all_orders():
@@ -56,13 +57,6 @@ def test_energy_is_of_what_constants_do_not_take_up():
     assert energy(found, every, recalibrated, member) == pytest.approx(expected, rel=0.01)
 
 
-def _play(course, width):
-    held, out = course[0], np.empty(len(course))
-    for i, value in enumerate(course):
-        held = out[i] = min(max(held, value - width), value + width)
-    return out
-
-
 def test_a_cause_has_its_share_where_a_random_walk_has_most_of_the_energy():
     """Of a hysteresis alone, beside a constant of each run that is none: all, whatever the walk does."""
     rng, time, noise = np.random.default_rng(5), 60.0 * np.arange(600), NoiseModel(0.002, 0.0, 0.02)
@@ -71,7 +65,7 @@ def test_a_cause_has_its_share_where_a_random_walk_has_most_of_the_energy():
         runs = []
         for i, slow in enumerate((2500.0, 4000.0)):
             course = 25.0 + 30.0 * np.sin(time / slow)
-            gyro = 0.006 * (_play(course, 8.0) - course) + 0.002 * 60.0**0.5 * rng.standard_normal(600)
+            gyro = 0.006 * (play(course, 8.0) - course) + 0.002 * 60.0**0.5 * rng.standard_normal(600)
             gyro += 0.02 * np.cumsum(rng.standard_normal(600)) / 60.0**0.5
             runs.append(Run.from_columns(f"r{i}", time=time, gyro=gyro, T=course))
         held = foreseen(twin, runs, noise, STANDARD).field

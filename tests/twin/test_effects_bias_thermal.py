@@ -17,6 +17,7 @@ from fogml.twin.nominal import nominal_columns
 from fogml.twin.optics import Coil
 from fogml.twin.plant.standard import standard_network
 from fogml.twin.registry import effect
+from tests.play_operator import play
 
 Node = Callable[[FloatArray], FloatArray]
 
@@ -149,14 +150,6 @@ class TestGlassTransition:
             given = inputs(5, T=lambda t, held=held: np.full_like(t, held))
             found = response("glass_transition", given, transition_temperature=-20.0, static_ratio=0.1)
             assert found == pytest.approx(wanted, abs=1e-6)
-
-
-def play(x: FloatArray, half_width: float) -> FloatArray:
-    out, s = [], x[0]
-    for value in x:
-        s = min(max(s, value - half_width), value + half_width)
-        out.append(s)
-    return np.array(out)
 
 
 def swing(period_min: float) -> Node:

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from fogml.runs.run import Run
 from fogml.validation.thermometer_lag import lag_note
+from tests.play_operator import play
 
 STEP_S = 20.0
 CASE_S, COIL_S = 240.0, 420.0
@@ -30,13 +31,6 @@ def chamber(rate: float, *ends: tuple[float, float]) -> np.ndarray:
         parts.append(np.full(int(soak * 60.0 / STEP_S), end))
         last = end
     return np.concatenate(parts)
-
-
-def play(x: np.ndarray, half_width: float) -> np.ndarray:
-    out, last = np.empty_like(x), x[0]
-    for i, value in enumerate(x):
-        out[i] = last = min(max(last, value - half_width), value + half_width)
-    return out
 
 
 Drift = Callable[[np.ndarray, np.ndarray], np.ndarray]
