@@ -94,8 +94,8 @@ def nonlinearity_within(run: Run, plateaus: Plateaus, scale_factor: float) -> tu
     """90 % interval of the greatest deviation from the line over the greatest output [ppm].
 
     It begins at 0 where noise alone may make as much. The noise is that of the outputs beside a level for
-    each rate, white, flicker and random walk, weighed by what they speak for. An error of the table's
-    that comes with a rate each time is in the interval as the gyro's own would be.
+    each rate, white, flicker and random walk, weighed by what they speak for, and that of a measured rate. An
+    error of the table's that comes with a rate each time is in the interval as the gyro's own would be.
 
     Returns
     -------
@@ -119,9 +119,12 @@ def nonlinearity_within(run: Run, plateaus: Plateaus, scale_factor: float) -> tu
         return None
     shown = slice(1, len(rates))
     line = np.column_stack([np.ones(len(rates)), rates])
-    off_line = (np.eye(len(rates)) - line @ np.linalg.pinv(line))[:, shown]
-    errors = np.sqrt(np.maximum(np.diag(off_line @ covariance[shown, shown] @ off_line.T), 0.0))
-    low, high = greatest_within(off_line @ fitted.coef_[: len(rates) - 1], errors)
+    off_line = np.eye(len(rates)) - line @ np.linalg.pinv(line)
+    # A rate that was measured is known as well as its plateaus' means tell it.
+    of_rates = np.bincount(level, (scale_factor * plateaus.rate_error) ** 2) / np.bincount(level) ** 2
+    variances = np.diag(off_line[:, shown] @ covariance[shown, shown] @ off_line[:, shown].T)
+    errors = np.sqrt(np.maximum(variances, 0.0) + off_line**2 @ of_rates)
+    low, high = greatest_within(off_line[:, shown] @ fitted.coef_[: len(rates) - 1], errors)
     ppm = 1e6 / (abs(scale_factor) * float(np.abs(rates).max()))
     return ppm * low, ppm * high
 

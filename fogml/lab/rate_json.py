@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.lab.rate_errors import nonlinearity_within
-from fogml.lab.rate_pieces import Plateaus, find_oscillations, find_plateaus, merged
+from fogml.lab.rate_pieces import Plateaus, find_oscillations, find_plateaus, merged, with_steady_earth
 from fogml.lab.rate_response import Gain, Slew, bandwidth, gain_of, slew
 from fogml.lab.rate_temperature import by_temperature, temperature_sensitivity
 from fogml.lab.rate_tests import (
@@ -148,6 +148,7 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
     for run in runs:
         if "rate" not in run.columns or not run.rate.any():
             continue
+        run = with_steady_earth(run)
         waves = find_oscillations(run)
         gains += [gain_of(run, wave) for wave in waves]
         plateaus = find_plateaus(run, waves, settle_s)

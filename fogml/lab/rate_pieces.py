@@ -80,6 +80,24 @@ def earth_deg_h(run: Run) -> float:
     return run.facts.earth_rate_deg_h or 0.0
 
 
+def with_steady_earth(run: Run) -> Run:
+    """A run as it would be if Earth rate did not change with the table's recorded angle.
+
+    Where the table turns the input axis about, what Earth makes of its output is taken off by the slope of
+    the output over the rate, which a few ppm of a scale factor or a bend leave nearly as it is.
+    """
+    if "angle" not in run.columns or not run.earth_known:
+        return run
+    turning = run.reference_deg_h - 3600.0 * run.rate - earth_deg_h(run)
+    if not turning.any():
+        return run
+    rate = run.rate - run.rate.mean()
+    slope = float(rate @ run.gyro_deg_h) / (3600.0 * float(rate @ rate))
+    counts = run.facts.scale_factor if run.gyro_unit == "count" else None
+    per_deg_h = 1.0 if counts is None else counts.count_per_deg_h
+    return run.with_columns(gyro=run.gyro - slope * per_deg_h * turning)
+
+
 def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float | None = None) -> Plateaus:
     """The plateaus of a run's table rate.
 
