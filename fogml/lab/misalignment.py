@@ -65,8 +65,8 @@ class TableMeasurements:
         Whether they come from a simulation.
     place
         When they were measured, in any unit that increases evenly; None where no one says.
-    left_out
-        Sentences on turns that were recorded and are not among them.
+    notes
+        Sentences on what was recorded: turns that are not among them, samples that stand out.
     """
 
     state: FloatArray
@@ -78,7 +78,7 @@ class TableMeasurements:
     state_angles_deg: Sequence[float] = DOCUMENT_ANGLES_DEG
     synthetic: bool = False
     place: FloatArray | None = None
-    left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
         scale_drift_ppm=None if drift is None else 1e6 * drift.share,
         scale_drift_se_ppm=None if drift is None else 1e6 * drift.se,
         notes=(
-            *measured.left_out,
+            *measured.notes,
             *doubts,
             *notes,
             *more,

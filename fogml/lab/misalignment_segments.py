@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from fogml.errors import InputError, counted
 from fogml.lab.misalignment import TableMeasurements, determines
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG
 from fogml.numerals import listed, short
+from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.raw_table import numbered_row
 from fogml.runs.run import Run
 from fogml.runs.transitions import MARGIN_BEYOND_S, time_to_rate_s, transition_mask
@@ -149,10 +150,24 @@ def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
         ends[place], turning_part = _whole_turns(run, start, int(last[place]), sample_s)
         level[start : ends[place]] -= turning_part
     try:
-        return _measured(rows, _chunks(replace(rows, output=level), (first, ends), rest))
+        found = _measured(rows, _chunks(replace(rows, output=level), (first, ends), rest))
     except InputError:
         _check_left(rows, run, kept, rest)
         raise
+    return replace(found, notes=(*found.notes, *_standing_out(rows, run, kept)))
+
+
+def _standing_out(rows: Rows, run: Run, kept: BoolArray) -> Iterator[str]:
+    """What is said of samples that stand out from their neighbours, of those that count."""
+    outliers, sigma = find_outliers(run.gyro, run.rate)
+    told = kept[outliers]
+    if told.any():
+        row = int(outliers[told][0])
+        yield (
+            f"{counted(int(told.sum()), 'sample')} of the output over {OUTLIER_SIGMA:g} robust sigma "
+            f"({short(sigma[told][0], 4)} {rows.unit}) off their neighbours, the first {run.gyro[row]:.6g} "
+            f"in {rows.row_name(row)}; they count in every figure: correct or remove the rows"
+        )
 
 
 def _check_left(rows: Rows, run: Run, kept: BoolArray, rest: BoolArray) -> None:
@@ -287,7 +302,7 @@ def _measured(rows: Rows, chunks: _Chunks) -> TableMeasurements:
     others = len(turns) - len(kept) - len(missing)
     told = f"{len(turns) - len(kept)} of {counted(len(turns), 'turn')}"
     more = f"; with it {counted(others, 'turn')} of that state and tilt the other way" if others else ""
-    return replace(found, left_out=(f"{told} left out: {listed(missing)}{more}",))
+    return replace(found, notes=(f"{told} left out: {listed(missing)}{more}",))
 
 
 def _turn_words(rows: Rows, chunks: _Chunks, turn: int) -> str:
