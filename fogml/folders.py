@@ -92,22 +92,30 @@ def has_to_stay(real: Path) -> bool:
 
 
 def exchange_whole(content: Path, real: Path) -> bool:
-    """Put a folder in another's place in one step, with what only the other holds; False if impossible."""
+    """Put a folder in another's place in one step, with what only the other holds; False if impossible.
+
+    What is carried over stays the file that it is, under a second name: it is impossible where files have
+    no second names, and where they or folders can't be given the mode that they have, as on some shares.
+    """
     carried = [entry for entry in real.iterdir() if not os.path.lexists(content / entry.name)]
-    for entry in carried:
-        target = content / entry.name
-        if is_folder(entry):
-            shutil.copytree(entry, target, symlinks=True, copy_function=_link)
-        else:
-            _link(entry, target)
-    shutil.copymode(real, content)
-    if not _exchange(content, real):
+    try:
+        for entry in carried:
+            target = content / entry.name
+            if is_folder(entry):
+                shutil.copytree(entry, target, symlinks=True, copy_function=_link)
+            else:
+                _link(entry, target)
+        shutil.copymode(real, content)
+        exchanged = _exchange(content, real)
+    except OSError:
+        exchanged = False
+    if not exchanged:
         for entry in carried:
             place = content / entry.name
             if is_folder(place):
                 shutil.rmtree(place)
             else:
-                place.unlink()
+                place.unlink(missing_ok=True)
         return False
     # What somebody put there at this moment.
     for entry in content.iterdir():
@@ -117,11 +125,28 @@ def exchange_whole(content: Path, real: Path) -> bool:
 
 
 def _link(source: str | Path, target: str | Path) -> None:
-    """The same file under a second name; a copy where there are no hard links."""
+    """The same file under a second name."""
+    os.link(source, target, follow_symlinks=False)
+
+
+def give_name(source: Path, name: Path) -> None:
+    """Let a whole file have a name that nothing else has, in one step where the file system has hard links.
+
+    Raises
+    ------
+    FileExistsError
+        If something of that name is there; the source stays.
+    """
     try:
-        os.link(source, target, follow_symlinks=False)
+        os.link(source, name)
+    except FileExistsError:
+        raise
     except OSError:
-        shutil.copy2(source, target, follow_symlinks=False)
+        # Without hard links, as on exFAT and many shares, an empty file takes the name before all others.
+        os.close(os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
+        os.replace(source, name)
+    else:
+        os.unlink(source)
 
 
 def _exchange(one: Path, other: Path) -> bool:

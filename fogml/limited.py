@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 
+from fogml.errors import InputError
 from fogml.outputs import scratch_folder
 from fogml.processes import needs_posix
 
@@ -61,9 +62,11 @@ def run_limited(words: Sequence[str], limits: ProgramLimits, data: bytes = b"") 
     LimitExceededError
         If it took more; whatever it had started is ended.
     InputError
-        If the system has no such limits.
+        If the system has no such limits, or does not let the program run.
     """
     needs_posix(f"{Path(words[0]).name}, which runs within limits,")
+    from fogml.limited_child import CANNOT_RUN
+
     memory = -1 if limits.memory_bytes is None else limits.memory_bytes
     stated = (limits.cpu_s, memory, limits.output_bytes)
     launcher = [sys.executable, "-I", "-S", str(_CHILD), *map(str, stated), *words]
@@ -98,6 +101,11 @@ def run_limited(words: Sequence[str], limits: ProgramLimits, data: bytes = b"") 
             raise LimitExceededError(f"took more than {limits.cpu_s} s of processor time")
         if status == -signal.SIGXFSZ:
             raise LimitExceededError(f"wrote more than {limits.output_bytes >> 20} MB")
+        if told.startswith(CANNOT_RUN):
+            raise InputError(
+                f"{words[0]}: cannot be run ({told.removeprefix(CANNOT_RUN)}); where programs among "
+                "temporary files may not run, let TMPDIR name a folder where they may"
+            )
         return Finished(status, output.read(), told)
 
 

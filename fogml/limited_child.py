@@ -11,6 +11,9 @@ import resource
 import signal
 import sys
 
+CANNOT_RUN = "fogml cannot run it: "
+"""What is said, with the system's reason, of a program that can't be begun."""
+
 
 def become(cpu_s: str, memory_bytes: str, output_bytes: str, *words: str) -> None:
     """Set the limits of `fogml.limited.ProgramLimits` and become a program."""
@@ -31,7 +34,11 @@ def become(cpu_s: str, memory_bytes: str, output_bytes: str, *words: str) -> Non
         resource.setrlimit(kind, (limit, last))
     # Python ignores it, and so would what it becomes: writes beyond the limit would fail one by one.
     signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
-    os.execvp(words[0], words)
+    try:
+        os.execvp(words[0], words)
+    except OSError as error:
+        sys.stderr.write(f"{CANNOT_RUN}{error.strerror}")
+        sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -22,9 +22,6 @@ try:
 except ImportError:  # not a POSIX system
     fcntl = None  # type: ignore[assignment]
 
-ARE_KNOWN = fcntl is not None
-"""Whether the system has such locks."""
-
 
 class FileLock:
     """A lock held by whoever has locked a file, made if it is missing.

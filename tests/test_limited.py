@@ -51,6 +51,14 @@ def test_memory_has_a_limit():
     assert done.status == 1 and "MemoryError" in done.errors
 
 
+def test_a_program_that_may_not_run_is_told_with_what_to_do(tmp_path):
+    """As on a disk for temporary files that is mounted without leave to run them."""
+    program = tmp_path / "program"
+    program.write_text("#!/bin/sh\n")
+    with pytest.raises(InputError, match=r"program: cannot be run \(Permission denied\); .* TMPDIR"):
+        run_limited([str(program)], ProgramLimits())
+
+
 def test_what_a_program_started_ends_with_it(tmp_path):
     note = tmp_path / "pid"
     code = (

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError
+from fogml.folders import give_name
 from fogml.json_files import write_json
 from fogml.outputs import whole_file
 from fogml.processes import of_this_package, process_is_alive, process_start
@@ -41,11 +42,11 @@ def _claim(folder: Path, process: Any) -> bool:
     partial = folder / f"{PROCESS}.{os.getpid()}"
     write_json(partial, process)
     try:
-        os.link(partial, folder / PROCESS)
+        give_name(partial, folder / PROCESS)
     except FileExistsError:
         return False
     finally:
-        partial.unlink()
+        partial.unlink(missing_ok=True)
     return True
 
 

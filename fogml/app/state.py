@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -13,6 +12,7 @@ from typing import Any
 
 from fogml.app.jobs import Jobs, command_line
 from fogml.errors import FogmlError, InputError, quoted
+from fogml.folders import give_name
 
 LONGEST_NAME_BYTES = 180
 """Of a file's name: with what outputs add to it, it stays below the 255 bytes that systems allow."""
@@ -70,13 +70,15 @@ class Files:
             If there is one of that name: jobs may be reading it.
         """
         try:
-            os.link(partial, self.place(name))
+            give_name(partial, self.place(name))
         except FileExistsError:
             raise InputError(
                 f"{quoted(name)} is here already; remove it first, or rename the new one"
             ) from None
+        except OSError as error:
+            raise InputError(f"{quoted(name)} cannot be kept ({error.strerror})") from None
         finally:
-            partial.unlink()
+            partial.unlink(missing_ok=True)
 
     def remove(self, name: str) -> None:
         """Remove a file."""

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from fogml import __version__
-from fogml.errors import FogmlError, InputError, in_one_line
+from fogml.errors import FogmlError, InputError, in_one_line, quoted
 from fogml.fleet.manifest import Unit
 from fogml.json_files import read_json, write_json
 from fogml.locks import NO_ROOM
@@ -131,6 +131,10 @@ def run_task(task: Task) -> dict[str, Any]:
         fingerprint = task.fingerprint()
     except InputError as error:
         return lost(task, str(error))
+    held = _held(task)
+    if held is not None and (held["unit"], held["axis"]) != (task.unit.name, task.unit.axis):
+        whose = f"{held['unit']} {held['axis']}".strip()
+        return lost(task, f"{task.folder}: holds the results of {quoted(whose)}; choose another --out")
     known = finished(task, fingerprint)
     if known is not None:
         return known
@@ -138,6 +142,8 @@ def run_task(task: Task) -> dict[str, Any]:
     try:
         if task.unit.fault:
             raise InputError(task.unit.fault)
+        # Killed from here on, results would be of this job beside the outcome of another.
+        (task.folder / OUTCOME).unlink(missing_ok=True)
         outcome |= {"status": DONE, "found": dict(task.job(task.unit, task.folder))}
     except OSError as error:
         if error.errno in NO_ROOM:
@@ -164,11 +170,20 @@ def finished(task: Task, fingerprint: str | None = None) -> dict[str, Any] | Non
     Units that failed are tried again, and so are those whose outcome no job has written.
     """
     try:
-        values = read_json(task.folder / OUTCOME, "run the fleet again")
-        outcome = strictly(Outcome, values)
-        return values if outcome.fingerprint == (fingerprint or task.fingerprint()) else None
-    except (InputError, ValueError):
+        held = _held(task)
+        return held if held and held["fingerprint"] == (fingerprint or task.fingerprint()) else None
+    except InputError:
         return None  # what else is wrong with it the job tells
+
+
+def _held(task: Task) -> dict[str, Any] | None:
+    """The outcome in the unit's folder of a job that was done, of whatever runs, settings and unit."""
+    try:
+        values: dict[str, Any] = read_json(task.folder / OUTCOME, "run the fleet again")
+        strictly(Outcome, values)
+    except (InputError, ValueError):
+        return None
+    return values
 
 
 def lost(task: Task, reason: str) -> dict[str, Any]:

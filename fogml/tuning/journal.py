@@ -11,7 +11,7 @@ from typing import Any
 
 from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 
-from fogml.locks import ARE_KNOWN, FileLock
+from fogml.locks import FileLock
 
 
 class WholeLines(JournalFileBackend):
@@ -23,12 +23,14 @@ class WholeLines(JournalFileBackend):
 
     def __init__(self, file_path: str) -> None:
         path = Path(file_path)
-        if not ARE_KNOWN:
-            # Optuna's own locks are files that a killed process leaves behind.
-            lock: Any = JournalFileOpenLock(file_path)
-        else:
-            # The journal itself is locked: it is only ever added to, and no other file is left.
-            lock = FileLock(path)
+        # The journal itself is locked: it is only ever added to, and no other file is left.
+        lock: Any = FileLock(path)
+        lock.acquire()
+        lock.release()
+        if not lock.sure:
+            # Without such locks, as on some shares: a file of Optuna's, which others take away from a process
+            # that was killed after half a minute.
+            lock = JournalFileOpenLock(file_path)
         self._journal, self._guard = path, lock
         super().__init__(file_path, lock_obj=lock)
 

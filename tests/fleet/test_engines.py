@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from concurrent.futures import Future
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,34 @@ def test_an_outcome_that_no_job_has_written_is_made_again(tmp_path, key, value):
     path.write_text(json.dumps(sound | {key: value}))
     assert run_tasks(tasks(tmp_path, 1, quick)) == [sound]
     assert json.loads(path.read_text()) == sound
+
+
+def test_a_kill_leaves_no_outcome_beside_the_results_of_other_settings(tmp_path):
+    (task,) = tasks(tmp_path, 1, quick)
+    run_tasks([task])
+    with pytest.raises(Killed):
+        run_tasks([replace(task, job=killed, settings={"model": "other"})])
+    run_tasks([task])
+    assert noted(tmp_path / "out").count("done FOG-000") == 2
+
+
+def test_a_folder_that_another_unit_has_stays_as_it_is(tmp_path):
+    """Names of units are many to one folder: of another manifest, 'a/b' comes where 'a_b' lies."""
+    (task,) = tasks(tmp_path, 1, quick)
+    run_tasks([task])
+    held = (task.folder / OUTCOME).read_bytes()
+    (other,) = run_tasks([replace(task, unit=replace(task.unit, name="FOG 000"))])
+    assert other["status"] == "failed"
+    assert "holds the results of 'FOG-000 x'; choose another --out" in other["reason"]
+    assert (task.folder / OUTCOME).read_bytes() == held
+
+
+class Killed(BaseException):
+    """Stands for a kill: nothing is cleaned up after it."""
+
+
+def killed(unit, folder):
+    raise Killed
 
 
 @pytest.mark.parametrize("workers", [1, 2])

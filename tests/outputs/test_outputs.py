@@ -35,11 +35,19 @@ def write(folder: Path, **files: str) -> None:
         path.write_text(text)
 
 
-@pytest.fixture(params=["exchange", "one by one"])
+def not_permitted(*_, **__):
+    raise PermissionError(1, "Operation not permitted")
+
+
+@pytest.fixture(params=["exchange", "one by one", "no hard links", "no modes"])
 def way(request, monkeypatch):
-    """Both ways of replacing a folder that is there."""
+    """Every way of replacing a folder that is there, on shares that lack something too."""
     if request.param == "one by one":
         monkeypatch.setattr(folders, "_exchange", lambda one, other: False)
+    elif request.param == "no hard links":
+        monkeypatch.setattr(os, "link", not_permitted)
+    elif request.param == "no modes":
+        monkeypatch.setattr(os, "chmod", not_permitted)
     return request.param
 
 
@@ -58,6 +66,17 @@ def test_a_folder_is_replaced_and_keeps_what_is_not_of_it(tmp_path, way):
     }
     assert (out / "link").is_symlink()
     assert os.listdir(tmp_path) == ["out"]
+
+
+@pytest.mark.parametrize("lacking", [(), ("link",)])
+def test_a_name_is_given_once_with_and_without_hard_links(tmp_path, monkeypatch, lacking):
+    for name in lacking:
+        monkeypatch.setattr(os, name, not_permitted)
+    write(tmp_path, one="1", other="2")
+    folders.give_name(tmp_path / "one", tmp_path / "named")
+    with pytest.raises(FileExistsError):
+        folders.give_name(tmp_path / "other", tmp_path / "named")
+    assert tree(tmp_path) == {"named": "1", "other": "2"}
 
 
 def test_an_error_leaves_the_old_folder_as_it_was(tmp_path, way):

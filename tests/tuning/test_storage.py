@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
 import multiprocessing
 import resource
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from optuna.storages import JournalStorage
@@ -13,6 +17,7 @@ from optuna.storages import JournalStorage
 from experiments.faults.postgres import free_port
 from fogml.databases import without_password
 from fogml.errors import InputError
+from fogml.tuning import journal
 from fogml.tuning.journal import WholeLines
 from fogml.tuning.storage import JOURNAL, open_storage, shown
 from fogml.tuning.study import is_finished
@@ -48,14 +53,38 @@ def test_a_journal_that_is_none(tmp_path):
 
 def test_half_a_line_is_dropped_by_the_next_writer(tmp_path):
     path = tmp_path / "journal"
-    journal = WholeLines(str(path))
-    journal.append_logs([{"a": 1}, {"b": 2}])
+    held = WholeLines(str(path))
+    held.append_logs([{"a": 1}, {"b": 2}])
     with path.open("ab") as file:
         file.write(b'{"c": ')
     assert list(WholeLines(str(path)).read_logs(0)) == [{"a": 1}, {"b": 2}]
     WholeLines(str(path)).append_logs([{"d": 4}])
     assert [json.loads(line) for line in path.read_text().splitlines()] == [{"a": 1}, {"b": 2}, {"d": 4}]
-    assert list(journal.read_logs(2)) == [{"d": 4}]
+    assert list(held.read_logs(2)) == [{"d": 4}]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_without_locks_of_the_system_two_writers_lose_no_line(tmp_path, monkeypatch):
+    """As on a share that knows none: while one writes, another that looks where to write waits."""
+
+    def no_locks(handle, operation):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    path = tmp_path / "journal"
+    one, other = WholeLines(str(path)), WholeLines(str(path))
+    write_all = journal._write_all
+
+    def slowly(file, data):
+        time.sleep(0.02)
+        write_all(file, data)
+
+    monkeypatch.setattr(journal, "_write_all", slowly)
+    with ThreadPoolExecutor(2) as both:
+        told = [both.submit(log.append_logs, [{key: 1}]) for log, key in ((one, "a"), (other, "b"))]
+        for writing in told:
+            writing.result()
+    assert sorted(one.read_logs(0), key=str) == [{"a": 1}, {"b": 1}]
     assert list(tmp_path.iterdir()) == [path]
 
 
