@@ -22,7 +22,7 @@ from experiments.faults.sandbox import FAULTS, Limits, Outcome
 
 RUN = b"time [s],gyro [deg/h],T [degC]\n" + b"".join(b"%d,%d.5,25\n" % (10 * k, k % 3) for k in range(40))
 
-INPUTS = 300
+INPUTS = 150
 LIMITS = Limits(cpu_s=30.0, wall_s=120.0)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fogml.runs import reader_process
@@ -38,8 +38,11 @@ def files(tmp_path_factory):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-@settings(max_examples=15, deadline=None)
-@given(block_rows=st.integers(1, 1100))
+@settings(max_examples=4, deadline=None)
+@example(block_rows=7)
+@example(block_rows=999)
+@example(block_rows=1000)
+@given(block_rows=st.integers(100, 1100))
 def test_blocks_are_the_whole_run(files, suffix, block_rows):
     path = files / f"run{suffix}"
     whole = read_run(path)
