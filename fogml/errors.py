@@ -61,6 +61,15 @@ def quoted(value: object) -> str:
     return printable(_brief.repr(value).replace("\n", " "))
 
 
+def other_schema(found: object, schema: str, remedy: str) -> str:
+    """What is wrong with a file of another schema than the one that is read: one of a newer fogml says so."""
+    name, _, number = found.rpartition("/") if isinstance(found, str) else ("", "", "")
+    own, _, read = schema.rpartition("/")
+    if name == own and number.isdecimal() and (len(number), number) > (len(read), read):
+        return f"schema {quoted(found)} is of a newer fogml; this one reads '{schema}': update fogml"
+    return f"schema {quoted(found)}, expected '{schema}'{'; ' if remedy else ''}{remedy}"
+
+
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """``did you mean 'x'? `` where known names look like this one or hold it, else nothing."""
     known = list(known)

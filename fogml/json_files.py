@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fogml.errors import InputError, printable, quoted
+from fogml.errors import InputError, other_schema, printable, quoted
 from fogml.folders import with_slashes
 
 MOST_BYTES = 256 << 20
@@ -88,7 +88,7 @@ def json_object(value: Any, source: str, schema: str, remedy: str) -> dict[str, 
     """A value that was read, once it is known to be an object of a schema."""
     if not isinstance(value, dict) or value.get("schema") != schema:
         found = value.get("schema") if isinstance(value, dict) else type(value).__name__
-        raise InputError(f"{source}: schema {quoted(found)}, expected '{schema}'; {remedy}")
+        raise InputError(f"{source}: {other_schema(found, schema, remedy)}")
     return value
 
 

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 
 import yaml
 
-from fogml.errors import InputError, printable, quoted
+from fogml.errors import InputError, other_schema, printable, quoted
 from fogml.folders import with_slashes
 
 MOST_BYTES = 4 << 20
@@ -63,7 +63,7 @@ def read_yaml(path: Path, as_text: Collection[str] = (), schema: str | None = No
     values = parse_yaml(text, path.name, as_text)
     stated = values.get("schema", schema) if isinstance(values, dict) else schema
     if schema is not None and isinstance(stated, str) and stated != schema:
-        raise InputError(f"{path.name}: key 'schema': {schema} was expected (found {quoted(stated)})")
+        raise InputError(f"{path.name}: {other_schema(stated, schema, '')}")
     return values
 
 

@@ -15,6 +15,7 @@ from fogml.errors import (
     in_one_line,
     install_words,
     listed,
+    other_schema,
     quoted,
 )
 from fogml.export.noise_parameters import noise_text
@@ -55,6 +56,25 @@ def test_short_ones_are_quoted_as_they_are():
     assert quoted({"a": [1, None]}) == "{'a': [1, None]}"
     assert listed(["a", 1]) == "a, 1"
     assert listed(map(str, range(100))) == "0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 88 more"
+
+
+@pytest.mark.parametrize(
+    ("found", "newer"),
+    [
+        ("fogml.model/3", True),
+        ("fogml.model/10", True),
+        ("fogml.model/" + "9" * 9999, True),
+        ("fogml.model/1", False),
+        ("fogml.gap/3", False),
+        ("fogml.model/x", False),
+        (["fogml.model/3"], False),
+        (10**5000, False),
+        (None, False),
+    ],
+)
+def test_a_file_of_a_newer_fogml_says_so(found, newer):
+    told = other_schema(found, "fogml.model/2", "train again")
+    assert ("update fogml" in told) == newer == ("train again" not in told)
 
 
 def test_no_message_writes_on_the_terminal_or_fills_it():

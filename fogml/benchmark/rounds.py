@@ -19,6 +19,7 @@ from typing import Any, Literal, get_args
 from fogml.blind.folders import BlindFolder, read_json
 from fogml.blind.truth import Kind
 from fogml.errors import InputError
+from fogml.json_files import json_object
 from fogml.signals.averages import AVERAGING_S
 
 
@@ -147,10 +148,7 @@ def read_round(directory: str | Path) -> dict[str, Any]:
     path = Path(directory) / "handout" / "round.json"
     if not path.is_file():
         raise InputError(f"{path}: no such file; make a round first: fogml benchmark make {directory}")
-    values = read_json(path)
-    if values.get("schema") != SCHEMA:
-        raise InputError(f"{path}: schema '{values.get('schema')}' is not {SCHEMA}; make the round anew")
-    return values
+    return json_object(read_json(path), str(path), SCHEMA, "make the round anew")
 
 
 def check_kept(directory: str | Path, told: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError, did_you_mean, known_are, quoted
+from fogml.errors import InputError, did_you_mean, known_are, other_schema, quoted
 from fogml.numerals import number_text
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.schedule import Schedule, schedule
@@ -159,7 +159,7 @@ def programme_from(values: Any, source: str = "programme") -> Programme:
             known = known_are(str(key), _KEYS, "known keys")
             raise InputError(f"{source}: unknown key {quoted(key)}; {known}")
     if values.get("schema", SCHEMA) != SCHEMA:
-        raise InputError(f"{source}: 'schema' is {quoted(values['schema'])}; {SCHEMA} is understood")
+        raise InputError(f"{source}: {other_schema(values['schema'], SCHEMA, '')}")
     settings: dict[str, Any] = {}
     for key, (dimension, _) in _QUANTITIES.items():
         if key in values:

@@ -176,7 +176,7 @@ def test_what_cannot_be_done_names_the_step(steps: list[Any], message: str) -> N
     ("values", "message"),
     [
         ({"steps": ["hold for 1 h"], "speed": 3}, "unknown key 'speed'; known keys are schema, name"),
-        ({"steps": ["hold for 1 h"], "schema": "fogml.twin/1"}, "'schema' is 'fogml.twin/1'"),
+        ({"steps": ["hold for 1 h"], "schema": "fogml.twin/1"}, "schema 'fogml.twin/1', expected"),
         (
             {"steps": ["hold for 1 h"], "fastest_rate": "3 degC"},
             "key 'fastest_rate': a temperature rate needs",
