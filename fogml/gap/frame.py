@@ -35,6 +35,8 @@ class Setting:
         Responses to one prior standard deviation, shape (m_r, p) for each run; constants first.
     errors
         What errors of each fit run's readings make of its replay, columns of unit priors, shape (m_r, k_r).
+    covariances
+        Of those, shape (m_r, m_r), where there are many of a run.
     values
         The constants at which effects meet the output: as fitted beside nothing, to begin with.
     widened
@@ -48,6 +50,14 @@ class Setting:
     values: Mapping[str, float]
     widened: Mapping[str, float] = field(default_factory=dict)
     errors: tuple[FloatArray, ...] = ()
+    covariances: tuple[FloatArray | None, ...] = ()
+
+    def with_covariances(self) -> Setting:
+        """With the covariances of errors that are as many as it takes to be met more cheaply by those."""
+        many = (3 * e.shape[1] > len(e) for e in self.errors)
+        return replace(
+            self, covariances=tuple(e @ e.T if wide else None for e, wide in zip(self.errors, many))
+        )
 
     @property
     def deviations(self) -> FloatArray:
@@ -77,20 +87,41 @@ class RunWhitening:
 
     Those, columns A of unit priors once whitened by the noise, add A A' to the covariance. With
     I + A'A = C C' an inverse root of I + A A' is I - A (C' + I)^-1 C^-1 A'
-    (A. Andrews, AIAA Journal 6 (1968) 1165).
+    (A. Andrews, AIAA Journal 6 (1968) 1165); of many columns the inverse of its own factor costs less.
+
+    Parameters
+    ----------
+    noise, rows, longest_runs
+        The noise, the run, and how many run lengths its flicker goes on to.
+    errors, covariance
+        Columns of unit priors, shape (m, k), and what they add to the covariance, shape (m, m), where those
+        are many.
     """
 
-    def __init__(self, noise: NoiseModel, rows: Rows, longest_runs: float, errors: FloatArray) -> None:
+    def __init__(
+        self,
+        noise: NoiseModel,
+        rows: Rows,
+        longest_runs: float,
+        errors: FloatArray,
+        covariance: FloatArray | None = None,
+    ) -> None:
         self._whitener = whitener_of(noise, rows, longest_runs)
         extra = (1.0 / rows.weight**2 - 1.0) * noise.white_density / rows.row_s
         self._weight = 1.0 / np.sqrt(1.0 + extra / self._whitener.deviation**2)
-        self._raw, self._errors = errors, self._by_noise(errors)
         self.log_det = self._whitener.log_det - float(np.sum(np.log(self._weight)))
-        if errors.size:
-            self._factor = factor = prior_factor(self._errors.T @ self._errors)
-            beside = solve_triangular(factor + np.eye(len(factor)), self._errors.T, lower=True)
-            self._taken = solve_triangular(factor, beside, lower=True, trans=1).T
-            self.log_det += float(np.sum(np.log(np.diagonal(factor))))
+        self._given, self._factor, self._taken = errors, None, None
+        if covariance is not None:
+            # With W the noise's whitening and C the covariance: C W', and a factor of I + W C W'.
+            self._across = self._by_noise(covariance).T
+            self._factor = prior_factor(self._by_noise(self._across))
+        elif errors.size:
+            self._across = self._by_noise(errors).T
+            self._factor = prior_factor(self._across @ self._across.T)
+            beside = solve_triangular(self._factor + np.eye(len(self._factor)), self._across, lower=True)
+            self._taken = solve_triangular(self._factor, beside, lower=True, trans=1).T
+        if self._factor is not None:
+            self.log_det += float(np.sum(np.log(np.diagonal(self._factor))))
 
     def _by_noise(self, values: FloatArray) -> FloatArray:
         white = self._whitener.whiten(values)
@@ -100,16 +131,20 @@ class RunWhitening:
     def whiten(self, values: FloatArray) -> FloatArray:
         """Series of shape (m, ...), whitened."""
         white = self._by_noise(values)
-        if self._errors.size:
-            white -= self._taken @ (self._errors.T @ white)
+        if self._taken is not None:
+            white -= self._taken @ (self._across @ white)
+        elif self._factor is not None:
+            white = solve_triangular(self._factor, white, lower=True, overwrite_b=True)
         return white
 
     def errors_in(self, values: FloatArray) -> FloatArray:
         """What of series of shape (m, ...) is errors of the readings, by their posterior mean."""
-        if not self._raw.size:
+        if self._factor is None:
             return np.zeros(values.shape)
-        along = self._errors.T @ self._by_noise(values)
-        return np.asarray(self._raw @ cho_solve((self._factor, True), along))
+        white = self._by_noise(values)
+        if self._taken is None:
+            return np.asarray(self._across @ cho_solve((self._factor, True), white))
+        return np.asarray(self._given @ cho_solve((self._factor, True), self._across @ white))
 
 
 class Whitening:
@@ -119,7 +154,9 @@ class Whitening:
         self.noise = noise
         fit, longest = setting.scene.fit, setting.priors.noise.longest_runs
         errors = setting.errors or [np.zeros((len(rows), 0)) for rows in fit]
-        self.runs = [RunWhitening(noise, rows, longest, own) for rows, own in zip(fit, errors, strict=True)]
+        wide = setting.covariances or [None] * len(fit)
+        told = zip(fit, errors, wide, strict=True)
+        self.runs = [RunWhitening(noise, rows, longest, own, many) for rows, own, many in told]
 
     def stacked(self, series: Sequence[FloatArray]) -> FloatArray:
         """Series of each fit run, shape (m_r, ...), whitened and one after the other; others left out."""
@@ -145,7 +182,7 @@ def setting_of(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise
         setting = replace(setting, widened={**setting.widened, **more})
         least = [priors.noise.least_error * by for by in noises]
         errors = (_reading_errors(r, setting.values, by) for r, by in zip(scene.fit, least))
-        setting = replace(setting, errors=tuple(errors))
+        setting = replace(setting, errors=tuple(errors)).with_covariances()
         fixed = tuple(fixed_columns(setting, i, plant) for i in range(len(scene.runs)))
         whitening = Whitening(noise, setting)
         found = Posterior.of(whitening.stacked(fixed), whitening.stacked([r.gap for r in scene.fit]))
@@ -227,10 +264,11 @@ def with_form_errors(setting: Setting, noise: NoiseModel, length: float) -> Sett
 
     Where that is too short to be seen there is none.
     """
-    share, count = setting.priors.form_error * length, setting.priors.noise.form_waves
+    share, scene = setting.priors.form_error * length, setting.scene
+    count = min(setting.priors.noise.form_waves, scene.most_of_own)
     if share < 1.0:
         return setting
-    runs, fitted = setting.scene.runs, setting.scene.fitted
+    runs, fitted = scene.runs, scene.fitted
     waves = []
     for i, rows in enumerate(runs):
         held = np.zeros((len(rows), count * fitted))

@@ -61,6 +61,9 @@ class Grids:
         The unknown: shortest half periods of what is smooth in time; steps in a run, many or a single one;
         bumps of temperature; lags of what remembers it, of what creeps while hot or cold, decays after its
         turns, which are turns once it came back by twice `turn_degc`.
+    rows_each
+        Rows of a run, at least, for each half wave, step or strength of what is in its own time: what
+        long and many runs cost stays that of all their rows, and faster courses are hardly other than noise.
     unknown_lines, line_weight, starts_s
         The unknown: lines, each one among as many as a run of some hours holds between its start and its
         rows; from when to when after the start something may be settling.
@@ -119,6 +122,7 @@ class Grids:
     creeps_s: tuple[float, ...] = (1800.0, 7200.0, 30000.0)
     heals_s: tuple[float, ...] = (900.0, 3000.0, 9000.0, 1e9)
     turn_degc: float = 1.0
+    rows_each: float = 4.0
     unknown_lines: int = 3
     line_weight: float = 0.01
     starts_s: tuple[float, float] = (30.0, 30000.0)

@@ -194,8 +194,10 @@ def infer(
     tell("building families")
     columns = Columns.of(families_of(plant, scene, without), scene, setting.values)
     how, factors = priors.search, priors.noise.white_factors
+    search: Search | None = None
     for _ in range(how.rounds):
         tell("searching")
+        search = None  # its columns make room for those at the new noise
         best = points.best
         search = Search(Field(setting, columns, points.noises[best]))
         found = search.explanations()
@@ -205,18 +207,20 @@ def infer(
         # What fast causes make looks like noise until they are known.
         whites = [points.with_white(factor) for factor in factors]
         sure = found[: how.sure]
-        beside = [Field(setting, columns, p.noises[best], _nodes(sure)) for p in whites]
-        likeliest = over_noises(sure, beside, [0.0] * len(beside))
+        # One after the other: each is as large as all rows by all columns.
+        beside = (Field(setting, columns, p.noises[best], _nodes(sure)) for p in whites)
+        likeliest = over_noises(sure, beside, [0.0] * len(whites))
         scores = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in likeliest])
         settled = factors[int(np.argmax(scores))] == 1.0
         points = whites[int(np.argmax(scores))]
-        fields = [Field(setting, columns, m, _nodes(found)) for m in points.noises]
+        fields = (Field(setting, columns, m, _nodes(found)) for m in points.noises)
         rescored = over_noises(found, fields, points.log_priors)
         by_noise = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in rescored])
         points = replace(points, log_posteriors=by_noise)
         if settled and points.best == best:
             break
         points = points.within(priors.hopeless)
+    assert search is not None
     return Inference(model, plant, setting, columns, points, search, tuple(rescored), (*unusable, *more))
 
 
@@ -262,7 +266,7 @@ def _rows(
 
 
 def over_noises(
-    explanations: Sequence[Explanation], fields: Sequence[Field], log_priors: Sequence[float]
+    explanations: Sequence[Explanation], fields: Iterable[Field], log_priors: Sequence[float]
 ) -> list[Explanation]:
     """Explanations with their evidence at each noise, the likeliest first."""
     by_noise: list[list[float]] = [[] for _ in explanations]

@@ -94,6 +94,11 @@ class Scene:
         return max(r.row_s for r in self.fit)
 
     @cached_property
+    def most_of_own(self) -> int:
+        """How many half waves or steps a course in a run's own time has at most."""
+        return max(int(max(map(len, self.fit)) / self.grids.rows_each), 2)
+
+    @cached_property
     def begun_s(self) -> tuple[float, ...]:
         """When each run's clock began, after the first run's [s]; one after the other where unknown."""
         started = [r.run.facts.started for r in self.runs]

@@ -28,14 +28,17 @@ def _begun(place: FloatArray, count: int) -> FloatArray:
 def _smooth(half_period_s: float, rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     span = float(rows.end_s[-1] - rows.end_s[0]) + rows.row_s
     longest = max(float(r.end_s[-1] - r.end_s[0]) + r.row_s for r in scene.fit)
-    count = max(int(longest / half_period_s), 2)
+    slower = [s for s in scene.grids.smooth_s if s > half_period_s]
+    if any(longest / s >= scene.most_of_own for s in slower):
+        return  # a slower one is as fast as rows allow
+    count = max(min(int(longest / half_period_s), scene.most_of_own), 2)
     phase = np.pi * (rows.time_s - rows.time_s[0]) / span
     yield Block(np.cos(phase[:, None] * np.arange(1, count + 1)))
 
 
 def _steps(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    place, single = np.arange(len(rows)) / len(rows), scene.grids.single_steps
-    yield Block(_begun(place, scene.grids.steps))
+    place, single = np.arange(len(rows)) / len(rows), min(scene.grids.single_steps, scene.most_of_own)
+    yield Block(_begun(place, min(scene.grids.steps, scene.most_of_own)))
     for i, step in enumerate(_begun(place, single).T):
         yield Block(step[:, None], {"at": (i + 1.0) / (single + 1.0)}, 1.0 / single)
 
@@ -175,7 +178,8 @@ def _lines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
         held = {"period": 1.0 / frequency}
         for strength in strengths:
             yield Block(strength[:, None] * waves, held, weight / len(strengths))
-        yield Block(np.concatenate([s[:, None] * waves for s in any_of], axis=1), held, weight)
+        if len(any_of) * waves.shape[1] <= scene.most_of_own:
+            yield Block(np.concatenate([s[:, None] * waves for s in any_of], axis=1), held, weight)
 
 
 def _start(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
@@ -199,14 +203,15 @@ def _readings_in_time(rows: Rows, scene: Scene, constants: Constants) -> Iterato
     """Errors of thermometers that wander, or go in steps, in a run's own time."""
     grids = scene.grids
     place = np.arange(len(rows.even.time)) / len(rows.even.time)
-    waves = np.cos(np.pi * place[:, None] * np.arange(1, grids.reading_waves + 1))
-    single = [step[:, None] for step in _begun(place, grids.reading_single_steps).T]
-    kinds = [waves, _begun(place, grids.reading_steps), *single]
+    counts = (grids.reading_waves, grids.reading_steps, grids.reading_single_steps)
+    waves, steps, singles = (min(count, scene.most_of_own) for count in counts)
+    single = [step[:, None] for step in _begun(place, singles).T]
+    kinds = [np.cos(np.pi * place[:, None] * np.arange(1, waves + 1)), _begun(place, steps), *single]
     widths = tuple(kind.shape[1] for kind in kinds)
     for group in READ_GROUPS:
         of_each = {n: kinds for n in group if n in rows.readings}
         for i, columns in enumerate(_through(rows, constants, of_each, widths)):
-            yield Block(columns, weight=1.0 if i < 2 else 1.0 / grids.reading_single_steps)
+            yield Block(columns, weight=1.0 if i < 2 else 1.0 / singles)
 
 
 def _of_temperature(rows: Rows, scene: Scene, name: str) -> list[FloatArray]:

@@ -12,6 +12,7 @@ import pytest
 
 from fogml.gap.grids import Grids
 from fogml.gap.scene import Scene, outstanding_lines
+from fogml.gap.unknown import unknown_families
 
 
 def rows(first_s: float, span_s: float, row_s: float, started: datetime | None) -> SimpleNamespace:
@@ -57,3 +58,39 @@ def test_a_clock_without_a_zone_is_not_put_on_this_machines(monkeypatch: pytest.
     finally:
         monkeypatch.undo()
         time.tzset()
+
+
+class _OfLength(SimpleNamespace):
+    """Rows of a run of a length, as what happens in a run's own time asks for them."""
+
+    def __init__(self, count: int, row_s: float) -> None:
+        end_s = row_s * (1.0 + np.arange(count))
+        super().__init__(end_s=end_s, time_s=end_s - 0.5 * row_s, row_s=row_s)
+
+    def __len__(self) -> int:
+        return len(self.end_s)
+
+
+@pytest.mark.parametrize(
+    ("runs", "count", "row_s", "fastest_s"),
+    [
+        (1, 1200, 30.0, 400.0),  # ten hours
+        (1, 1200, 216.0, 864.0),  # three days
+        (1, 1200, 2628.0, 10_512.0),  # a month
+        (40, 75, 144.0, 600.0),  # many runs of three hours
+    ],
+)
+def test_what_is_in_a_runs_own_time_costs_no_more_than_its_rows(
+    runs: int, count: int, row_s: float, fastest_s: float
+) -> None:
+    held: Any = Scene(tuple(_OfLength(count, row_s) for _ in range(runs)), runs, "tactical")  # type: ignore[arg-type]
+    drawn = {f.id: f for f in unknown_families(Grids()) if f.id == "steps" or f.id.startswith("time_")}
+    blocks = {id: list(f.build(held.runs[0], held, {})) for id, f in drawn.items()}
+    widest = {id: max(b.columns.shape[1] for b in own) for id, own in blocks.items() if own}
+    assert runs * max(widest.values()) <= runs * count / 4.0
+    assert count * row_s / max(w for id, w in widest.items() if id != "steps") == pytest.approx(
+        fastest_s, rel=0.06
+    )
+    # None of them is another one once more, and the slowest is always among them.
+    waves = [w for id, w in widest.items() if id != "steps"]
+    assert len(set(waves)) == len(waves) and "time_7200" in widest

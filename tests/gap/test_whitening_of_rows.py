@@ -34,10 +34,11 @@ def _covariance(rows):
 
 @pytest.mark.parametrize("columns", [1, 7, COUNT, 90])
 @pytest.mark.parametrize("size", [1e-6, 0.3, 30.0])
-def test_errors_of_readings_add_to_the_covariance(columns, size):
+@pytest.mark.parametrize("by_covariance", [False, True])
+def test_errors_of_readings_add_to_the_covariance(columns, size, by_covariance):
     rows = _rows()
     errors = size * np.random.default_rng(2).standard_normal((COUNT, columns))
-    held = RunWhitening(NOISE, rows, LONGEST, errors)
+    held = RunWhitening(NOISE, rows, LONGEST, errors, errors @ errors.T if by_covariance else None)
     dense = _covariance(rows) + errors @ errors.T
     white = held.whiten(np.eye(COUNT))
     tell = np.linalg.inv(dense)
@@ -61,7 +62,7 @@ def test_without_errors_noise_alone_whitens_and_nothing_is_of_the_readings():
 def test_runs_are_whitened_apart():
     runs = [_rows(1), _rows(2)]
     errors = tuple(np.random.default_rng(i).standard_normal((COUNT, 3)) for i in range(2))
-    setting = SimpleNamespace(scene=SimpleNamespace(fit=runs), priors=STANDARD, errors=errors)
+    setting = SimpleNamespace(scene=SimpleNamespace(fit=runs), priors=STANDARD, errors=errors, covariances=())
     whitening = Whitening(NOISE, setting)
     series = [np.random.default_rng(9).standard_normal((COUNT, 4)), np.zeros((COUNT, 4))]
     stacked = whitening.stacked(series)
