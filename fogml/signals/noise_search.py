@@ -12,6 +12,7 @@ from fogml.errors import InputError
 from fogml.signals.distributions import chi2_sf
 from fogml.signals.noise_spectrum import Spectrum
 from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, OutputFilter, SpectrumTerms
+from fogml.signals.slow_lines import without_slow_line
 from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel
 
 PLAIN = SpectrumTerms()
@@ -97,7 +98,7 @@ class NoiseSearch:
 
 
 def search_noise(spectrum: Spectrum) -> NoiseSearch:
-    """Fit and weigh noise models.
+    """Fit and weigh noise models, of what sinusoids of a few cycles leave (`fogml.signals.slow_lines`).
 
     White noise, flicker, random walk and quantisation alone; behind low passes of first and second order
     and a running mean; and, where none of those fits, from each octave on down, the rows above being left to
@@ -105,6 +106,13 @@ def search_noise(spectrum: Spectrum) -> NoiseSearch:
     """
     if not np.any(spectrum.power > 0.0):
         raise InputError("noise models: the values are all the same; there is no noise to fit")
+    search = _searched(spectrum)
+    while (less := without_slow_line(search.spectrum, search.best, search.excess)) is not None:
+        search = _searched(less)
+    return search
+
+
+def _searched(spectrum: Spectrum) -> NoiseSearch:
     size = np.log(max(float(spectrum.count.sum()), 2.0))
     plain = SpectrumModel(spectrum, PLAIN)
     found = [NoiseChoice(plain, plain.fit(), 0.0)]

@@ -48,12 +48,12 @@ class Resolution:
     line_chance
         Chance of taking noise for a line, of the whole spectrum.
     line_fewest
-        Coefficients of a bin in which lines are looked for: the median of fewer is known worse than to 40 %.
-        Bins of a sixteenth of an octave hold as many up to periods of a 361st of the stretch; slower
-        sinusoids are not looked for, and count as noise.
+        Coefficients of a bin whose own median tells the noise about a line: that of fewer is known worse than
+        to 40 %, and their neighbours' is taken.
     line_near
         Coefficients on either side whose median a line's are compared with: few, as a density that is steep
-        or has zeros is no line, and more than a line covers.
+        or has zeros is no line, and more than a line covers. Lines of the single coefficients are told from a
+        model of the noise (`fogml.signals.slow_lines`).
     collinear
         Share of the greatest singular value of the columns, each of length 1, from which a direction is told.
         Thermometers of one make whose readings agree to a few counts differ by more; what is below is the
@@ -70,10 +70,6 @@ class Resolution:
 
     def __post_init__(self) -> None:
         check_numbers(self, chances=("line_chance",), shares=("collinear",))
-
-    def slowest_line_s(self, stretch_s: float) -> float:
-        """Longest period of a sinusoid that is looked for in a stretch so long [s]."""
-        return 2.0 * stretch_s * (2.0 ** (1.0 / self.per_octave) - 1.0) / self.line_fewest
 
 
 @dataclass(frozen=True)

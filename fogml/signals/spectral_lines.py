@@ -59,15 +59,16 @@ def lines_of(
     masked: BoolArray | None = None
     lines: list[SpectralLine] = []
     for low, high in pairwise(edges.tolist()):
-        # A median of few, or of one side of a line, says nothing.
-        if high - low < fewest:
+        if high <= low:
             continue
         part = square[low:high]
         top = int(np.argmax(part))
         peak = float(part[top])
-        if peak <= limit * float(part.mean()) * 0.1:
+        # A median of few, or of one side of a line, says nothing.
+        about = part if high - low >= fewest else square[max(low + top - near, 0) : low + top + near + 1]
+        if len(about) < fewest or peak <= limit * float(about.mean()) * 0.1:
             continue
-        level = float(np.median(part)) / typical
+        level = float(np.median(about)) / typical
         if level <= 0.0 or peak <= limit * level:
             continue
         if masked is None:
