@@ -22,6 +22,7 @@ from fogml.errors import InputError, install_words
 from fogml.locks import NO_ROOM, sole_writer
 from fogml.monitor.record import NUMBERS, TEXTS, RunRecord
 from fogml.outputs import folder_to_fill, whole_file
+from fogml.readers.stored import LONGEST_MARK
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine, Table
@@ -92,6 +93,14 @@ class FolderStore(Store):
         return self.folder / FILE
 
     def add(self, records: Sequence[RunRecord]) -> int:
+        for record in records:
+            for name in TEXTS:
+                if len(getattr(record, name)) > LONGEST_MARK:
+                    raise InputError(
+                        f"{record.run}: '{name}' has {len(getattr(record, name))} characters; "
+                        f"a store keeps {LONGEST_MARK}"
+                    )
+
         def write() -> int:
             try:
                 with ExitStack() as stack:

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from fogml.arrow_arrays import values_of
-from fogml.readers.stored import Refused, text_of
+from fogml.readers.stored import LONGEST_MARK, Refused, text_of
 
 _BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
 _BATCH_ROWS = 1 << 16
-_LONGEST_MARK = 100
 _UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
@@ -121,7 +120,10 @@ class ParquetColumn:
         at = 0
         for piece in self.parts(0, self.shape[0]):
             for value in piece.to_pylist():
-                codes[at] = found.setdefault(text_of(value)[:_LONGEST_MARK], len(found))
+                mark = text_of(value)
+                if len(mark) > LONGEST_MARK:  # cut, two that differ behind it would be one
+                    raise Refused(f"a mark of more than {LONGEST_MARK} characters")
+                codes[at] = found.setdefault(mark, len(found))
                 at += 1
             if len(found) > most:
                 raise Refused(f"more than {most} different marks")

@@ -72,6 +72,21 @@ def test_records_come_back_as_they_were_and_once(tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", [0, 1])
+def test_long_names_that_differ_at_their_ends_are_two(tmp_path, kind):
+    record = replace(RECORD, unit="FOG-" + "0" * 200 + "1", run="r" * 230 + ".csv")
+    told = [record, replace(record, key="b" * 64, unit=record.unit[:-1] + "2")]
+    with closing(open_store(places(tmp_path)[kind])) as store:
+        store.add(told)
+        same(store.records(), told)
+
+
+def test_a_name_that_a_store_would_cut_is_refused(tmp_path):
+    with closing(open_store(places(tmp_path)[0])) as store:
+        with pytest.raises(InputError, match="'unit' has 1001 characters"):
+            store.add([replace(RECORD, unit="u" * 1001)])
+
+
+@pytest.mark.parametrize("kind", [0, 1])
 def test_a_run_whose_side_file_was_mended_stands_as_it_came_last(tmp_path, kind):
     with closing(open_store(places(tmp_path)[kind])) as store:
         store.add(others(3))
