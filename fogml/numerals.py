@@ -13,20 +13,35 @@ def number_text(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def short(value: float | None, digits: int = 3) -> str:
-    """A number to so many significant digits, a dash where there is none.
+def ascii_number(value: float, digits: int = 3) -> str:
+    """A number to so many significant digits, as feature text, programmes and C comments take it.
 
     Powers of ten only under 1e-4 and from 1e7 on.
 
     Examples
     --------
-    >>> short(1234.5), short(0.25), short(2e-5)
-    ('1230', '0.25', '2e-05')
+    >>> ascii_number(1234.5), ascii_number(-0.25), ascii_number(2e-5)
+    ('1230', '-0.25', '2e-05')
     """
-    if value is None:
-        return "–"
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e" in text and 1.0 <= abs(value) < 1e7 else text
+
+
+def short(value: float | None, digits: int = 3) -> str:
+    """A number to so many significant digits as sentences write it, a dash where there is none.
+
+    Examples
+    --------
+    >>> short(1234.5), short(-0.25), short(2e-5)
+    ('1230', '−0.25', '2 × 10⁻⁵')
+    """
+    return MISSING if value is None else _typeset(ascii_number(value, digits))
+
+
+def _typeset(text: str) -> str:
+    """The text of a number with a minus sign and a raised power."""
+    mantissa, mark, power = text.partition("e")
+    return (f"{mantissa} × {power_of_ten(int(power))}" if mark else text).replace("-", "−")
 
 
 _LABELS = {
@@ -85,13 +100,17 @@ def number(value: float | None, digits: int = 3) -> str:
     """
     if value is None or not math.isfinite(value):
         return MISSING if value is None or math.isnan(value) else ("∞" if value > 0 else "−∞")
+    return _typeset(_in_full(value, digits))
+
+
+def _in_full(value: float, digits: int) -> str:
+    """As `number`, in ASCII: with zeros behind, and all digits of what is above one."""
     if value == 0:
         return "0"
     exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if exponent < -4 or exponent >= 7:
-        mantissa, power = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa} × {power_of_ten(int(power))}".replace("-", "−")
-    return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{max(digits - 1 - exponent, 0)}f}"
 
 
 def power_of_ten(power: int) -> str:
@@ -112,12 +131,25 @@ def with_error(value: float, se: float) -> str:
     value = 0.0 if abs(value) < 0.005 * se else value
     places = 1 - math.floor(math.log10(se))
     if places < -2 or places > 6:
-        return f"{number(value)} ± {number(se, 2)}"
+        digits = math.floor(math.log10(abs(value))) + places + 1 if value else 1
+        return f"{number(value, min(max(digits, 1), 15))} ± {number(se, 2)}"
     if places <= 0:
         return f"{value:.0f} ± {se:.0f}".replace("-", "−")
     told = f"{value:.{places}f}"
     told = told.removeprefix("-") if float(told) == 0.0 else told
     return f"{told} ± {se:.{places}f}".replace("-", "−")
+
+
+def in_two(value: float, se: float | None) -> tuple[str, str]:
+    """A value and its standard error for two cells, both to the error's second figure.
+
+    Examples
+    --------
+    >>> in_two(10.718473, 1.36e-4), in_two(0.353, None)
+    (('10.71847', '0.00014'), ('0.353', '–'))
+    """
+    told, _, error = with_error(value, math.nan if se is None else se).partition(" ± ")
+    return told, error or number(se)
 
 
 def probability_words(probability: float) -> str:
@@ -131,7 +163,24 @@ def probability_words(probability: float) -> str:
 
 def stated(value: float) -> str:
     """A number that somebody stated, such as a limit, as they would write it."""
-    return f"{value:.10g}".replace("-", "−")
+    return _typeset(f"{value:.10g}")
+
+
+def against(value: float, *limits: float | None) -> str:
+    """A number that stands beside limits: with more digits than `number` where it would seem to lie on one.
+
+    Examples
+    --------
+    >>> against(0.7, 0.5), against(0.50004, 0.5), against(0.5, 0.5)
+    ('0.700', '0.50004', '0.500')
+    """
+    if not math.isfinite(value):
+        return number(value)
+    for digits in range(3, 17):
+        told = float(_in_full(value, digits))
+        if all(one is None or (told > one, told < one) == (value > one, value < one) for one in limits):
+            return number(value, digits)
+    return number(value, 17)
 
 
 def percent(share: float | None, places: int = 1) -> str:

@@ -17,7 +17,7 @@ from fogml.gap.own_simulator import ByColumn, by_column, has_column
 from fogml.gap.result import Diagnosis
 from fogml.gap.units import UnitsDiagnosis, diagnose_units
 from fogml.json_files import finite_json, write_json
-from fogml.numerals import listed, with_error
+from fogml.numerals import listed, probability_words, unit_words, with_error
 from fogml.outputs import whole_folder
 from fogml.runs.columns import REPLAYED
 from fogml.runs.run import Run
@@ -89,7 +89,10 @@ def _words(found: UnitsDiagnosis) -> dict[str, str]:
     """Each unit's verdict and what is named."""
     told = {}
     for unit, own in found.by_unit.items():
-        named = ", ".join(f"{f.effect} ({f.probability:.2f})" for f in own.named) or "nothing named"
+        named = (
+            ", ".join(f"{f.effect} ({probability_words(f.probability)})" for f in own.named)
+            or "nothing named"
+        )
         told[unit] = f"{own.verdict.replace('_', ' ')}; {named}"
     return told
 
@@ -203,18 +206,20 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
             [
                 f.effect,
                 ", ".join([*f.others, *(f"{m} (left out)" for m in f.left_out)]) or "–",
-                f"{f.probability:.2f}",
-                f"{with_error(f.amplitude.value, f.amplitude.se)} {f.amplitude.unit}",
+                probability_words(f.probability),
+                f"{with_error(f.amplitude.value, f.amplitude.se)} {unit_words(f.amplitude.unit)}",
             ]
             for f in found.found
         ]
         terminal.table("Effects found", ["effect", "can't be told from", "probability", "amplitude"], rows)
     for f in found.suspected:
         terminal.say(
-            f"Suspected, and not sure enough to be named: {' or '.join(f.members)} ({f.probability:.2f})"
+            f"Suspected, and not sure enough to be named: {' or '.join(f.members)} "
+            f"({probability_words(f.probability)})"
         )
     if found.unknown.probability >= 0.05:
-        terminal.say(f"Unknown: probability {found.unknown.probability:.2f}; {found.unknown.looks_like}")
+        likely = probability_words(found.unknown.probability)
+        terminal.say(f"Unknown: probability {likely}; {found.unknown.looks_like}")
     if found.how_far:
         terminal.show(how_far_table(found))
     names = titles(found)

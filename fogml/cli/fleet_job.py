@@ -186,7 +186,7 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     times = {unit["averaging_s"] for unit in values["units"] if unit["averaging_s"]}
     over = f", {times.pop():g} s averages" if len(times) == 1 else ""
     terminal.show(units_table(values["units"]), f"Worst test run of each unit{over}", UNITS_SHOWN)
-    for key, what in (("outliers", "Unlike the others"), ("again", "Needs another run")):
+    for key, what in (("outliers", "Unlike the others"), ("again", "Needs attention")):
         for item in values[key][:UNITS_SHOWN]:
             terminal.say(f"{what}: {item['unit']}: {item['why']}")
     most = max(len(values[key]) for key in ("units", "outliers", "again"))

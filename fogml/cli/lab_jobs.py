@@ -220,6 +220,7 @@ def write_report(
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    from fogml.numerals import unit_words
     from fogml.report.acceptance_page import VERDICTS, figure_words, limit_words, named
 
     rows = []
@@ -227,7 +228,7 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         if row["tested"]:
             met = {True: "met", False: "NOT met", None: ""}[row["met"]]
             figures = [figure_words(row, "before"), figure_words(row, "after")]
-            rows.append([row["name"], *figures, row["unit"], limit_words(row["limit"]), met])
+            rows.append([row["name"], *figures, unit_words(row["unit"]), limit_words(row), met])
     terminal.table(
         f"{named(values)}: acceptance", ["quantity", "before", "after", "unit", "limit", "outcome"], rows
     )

@@ -20,7 +20,7 @@ from fogml.monitor.monitor_json import monitor_json
 from fogml.monitor.record import RunRecord, record_run
 from fogml.monitor.store import open_store
 from fogml.monitor.watch import watch
-from fogml.numerals import in_order_of_serial, number
+from fogml.numerals import against, in_order_of_serial, number, stated
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 
@@ -151,6 +151,7 @@ def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
         key=lambda unit: (unit["state"] != "alarm", in_order_of_serial(unit_label(unit))),
     )
     shown = units[:UNITS_SHOWN]
+    limit = values["runs_between_false_alarms"]
     rows = []
     for unit in shown:
         last = unit["runs"][-1]
@@ -159,12 +160,12 @@ def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
                 unit_label(unit),
                 str(len(unit["runs"])),
                 number(last["level"]),
-                number(unit["statistic"][-1]),
+                against(unit["statistic"][-1], limit),
                 state_words(unit),
             ]
         )
     terminal.table(
-        f"Units in service; alarm at {values['runs_between_false_alarms']:g}",
+        f"Units in service; alarm at {stated(limit)}",
         ["unit", "runs", "last level [deg/h]", "evidence", "state"],
         rows,
     )

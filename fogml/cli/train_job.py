@@ -14,7 +14,7 @@ from fogml.cli.runs import open_noise, open_runs
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
-from fogml.numerals import number, percent
+from fogml.numerals import against, number, percent, stated
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
@@ -243,13 +243,12 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
         if told := unsettled(run):
             terminal.say(f"{run.run}: {told}")
     terminal.show(repeatability_table(judgement.repeatability))
-    stated = [*judgement.limits]
-    if judgement.design_index is not None:
-        stated.insert(0, judgement.design_index)
-    for outcome in stated:
+    index = [judgement.design_index] if judgement.design_index is not None else []
+    for outcome in (*index, *judgement.limits):
         verdict = "met" if outcome.met else "NOT met"
         name = "design index (rms)" if outcome is judgement.design_index else outcome.quantity
-        terminal.say(f"{name}: {number(outcome.value)}, limit {outcome.limit:g}: {verdict}")
+        reached = against(outcome.value, outcome.limit)
+        terminal.say(f"{name}: {reached}, limit {stated(outcome.limit)}: {verdict}")
     for note in judgement.notes:
         terminal.say(note)
     say_advice(judgement, terminal)

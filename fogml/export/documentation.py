@@ -16,7 +16,7 @@ from fogml.export.static_curve import at_rest
 from fogml.features.signal import unit_of
 from fogml.models.base import DriftModel
 from fogml.models.saved import model_hash
-from fogml.numerals import short
+from fogml.numerals import ascii_number
 
 
 def export_card(model: DriftModel, plan: Plan, pruning: dict[str, Any] | None) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def card_lines(card: dict[str, Any], plan: Plan, dtype: str) -> list[str]:
         f"features      {', '.join(plan.names) or 'none'}",
         *(f"trained box   {name}: {low:.6g} to {high:.6g}" for name, (low, high) in card["box"].items()),
         f"accuracy      90 % of {card['averaging_s']:g} s averages within "
-        f"{short(card['half_width_90_deg_h'])} deg/h,",
+        f"{ascii_number(card['half_width_90_deg_h'])} deg/h,",
         "              by parts of the training runs that were left out; not known outside the trained box",
         f"numbers       {dtype}"
         + (f", pruned to {card['pruned_to_bytes']} bytes of weights" if "pruned_to_bytes" in card else ""),
@@ -114,7 +114,7 @@ def documentation(model: DriftModel, plan: Plan | None = None) -> str:
         *_vectors(plan),
         "",
         f"accuracy     90 % of {card['averaging_s']:g} s averages within "
-        f"{short(card['half_width_90_deg_h'])} deg/h on parts of the training runs that were left out",
+        f"{ascii_number(card['half_width_90_deg_h'])} deg/h on parts of the training runs that were left out",
     ]
     return "\n".join(c_text(line).rstrip() for line in lines) + "\n"
 

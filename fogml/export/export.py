@@ -40,7 +40,7 @@ from fogml.export.settings import (
 from fogml.export.sklearn_graph import export_graph, is_graph_alone
 from fogml.export.storage import stored_plan, weight_bytes
 from fogml.models.base import DriftModel
-from fogml.numerals import short
+from fogml.numerals import ascii_number, short
 from fogml.outputs import scratch_folder
 from fogml.runs.run import Run
 
@@ -157,7 +157,7 @@ def _write_c(
     proven, flip = None, direction_flip(plan, seed)
     lines = [*card_lines(card, plan, dtype), *false_reading_lines(false)]
     if flip is not None:
-        lines.append(f"directions    told otherwise about a dead band make up to {short(flip)} deg/h")
+        lines.append(f"directions    told otherwise about a dead band make up to {ascii_number(flip)} deg/h")
     if number_of(dtype) == "fixed":
         windows = layout(plan, "fixed")
         proven = fixed_point_error(plan, windows, dtype)

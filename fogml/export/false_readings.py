@@ -12,7 +12,7 @@ from fogml.export.plan import Plan
 from fogml.export.points import box_points
 from fogml.features.atoms import RATE_UNIT_S, Atom
 from fogml.features.own import Recursion
-from fogml.numerals import short
+from fogml.numerals import ascii_number as short
 from fogml.runs.columns import is_temperature
 
 SECONDS = (0.0, 60.0, 300.0)

@@ -32,7 +32,7 @@ from fogml.export.points import GYRO_DEG_H
 from fogml.features.atoms import Atom
 from fogml.features.operators import BEYOND, LAG, PLAY
 from fogml.features.traced import BITS
-from fogml.numerals import short
+from fogml.numerals import ascii_number
 from fogml.signals.clock import EDGE_TOLERANCE, LEAST_SHARE, told_share
 from fogml.signals.kernel_windows import Kernel
 
@@ -296,7 +296,9 @@ def fixed_point_lines(proven: float | None, plan: Plan, windows: Layout) -> list
             "              window of one's own that tells no rate of the few samples that it holds;",
             "              export.json has what was measured",
         ]
-    told = f"worst case    fixed point is at most {short(proven)} deg/h off in the trained box, by proof"
+    told = (
+        f"worst case    fixed point is at most {ascii_number(proven)} deg/h off in the trained box, by proof"
+    )
     if plan.gives_rate:
         told += f" of outputs up to {GYRO_DEG_H:g} deg/h"
     lines = [told]

@@ -14,7 +14,7 @@ from fogml.export.c_program import compiled_output, write_files
 from fogml.export.c_source import project_files, templates
 from fogml.export.segments import Segments
 from fogml.json_files import write_json
-from fogml.numerals import short
+from fogml.numerals import ascii_number
 from fogml.outputs import scratch_folder
 
 SCHEMA = "fogml.segments/1"
@@ -129,7 +129,7 @@ def _source(
         card += [
             f"axis {axis}: {own['unit'] or 'unit not stated'}, {own['kind']} over {table.thermometer}, "
             f"{table.temperature[0]:.6g} to {table.temperature[-1]:.6g} degC",
-            f"  off from the model at rest by {short(table.largest)} deg/h at most",
+            f"  off from the model at rest by {ascii_number(table.largest)} deg/h at most",
             *(f"  trained on {run['name']}, SHA-256 {run['sha256']}" for run in own["training_runs"]),
         ]
     context = {

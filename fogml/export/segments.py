@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.export.static_curve import StaticCurve
-from fogml.numerals import short
+from fogml.numerals import against, short
 
 MOST_BREAKPOINTS = 64
 """A table of more is larger than the model that it stands for."""
@@ -85,8 +85,8 @@ def segments(
         if found.largest <= tolerance:
             return found
     raise InputError(
-        f"export: {MOST_BREAKPOINTS} breakpoints are still off by {short(found.largest)} deg/h, more than "
-        f"{short(tolerance)} deg/h; state --tolerance or --breakpoints if that is good enough"
+        f"export: {MOST_BREAKPOINTS} breakpoints are still off by {against(found.largest, tolerance)} deg/h, "
+        f"more than {short(tolerance)} deg/h; state --tolerance or --breakpoints if that is good enough"
     )
 
 

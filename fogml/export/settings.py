@@ -16,7 +16,7 @@ from fogml.export.plan import Plan
 from fogml.export.storage import FILE_DTYPES
 from fogml.intervals import LEVEL
 from fogml.models.base import DriftModel
-from fogml.numerals import short
+from fogml.numerals import against, short
 
 SCHEMA = "fogml.export/1"
 Target = Literal["c", "onnx", "json", "mat"]
@@ -98,8 +98,9 @@ def hold_within(
         ways += [] if settings.budget is None else ["allow more --bytes"]
         ways.append("state --tolerance if that is good enough")
         raise InputError(
-            f"export: in {dtype} the model's output differs by up to {short(total)} deg/h from the model's, "
-            f"more than the tolerance of {short(tolerance)} deg/h; {', or '.join(ways)}. Nothing was written"
+            f"export: in {dtype} the model's output differs by up to {against(total, tolerance)} deg/h from "
+            f"the model's, more than the tolerance of {short(tolerance)} deg/h; {', or '.join(ways)}. "
+            "Nothing was written"
         )
     if (
         difference.scale_ppm is not None
@@ -107,8 +108,9 @@ def hold_within(
         and difference.scale_ppm > _MOST_SCALE_PPM
     ):
         raise InputError(
-            f"export: in {dtype} the scale factor differs by up to {short(difference.scale_ppm)} ppm, more "
-            f"than {_MOST_SCALE_PPM:g} ppm; choose a finer --dtype, or state --tolerance. Nothing was written"
+            f"export: in {dtype} the scale factor differs by up to "
+            f"{against(difference.scale_ppm, _MOST_SCALE_PPM)} ppm, more than {_MOST_SCALE_PPM:g} ppm; "
+            "choose a finer --dtype, or state --tolerance. Nothing was written"
         )
 
 

@@ -21,7 +21,7 @@ from fogml.export.settings import SCHEMA, report_tail
 from fogml.export.static_curve import StaticCurve
 from fogml.intervals import LEVEL
 from fogml.models.base import DriftModel
-from fogml.numerals import short
+from fogml.numerals import against, stated
 from fogml.runs.run import Run
 from fogml.yaml_text import read_yaml
 
@@ -111,8 +111,9 @@ def export_tables(
     for axis, error in errors.items():
         if settings.tolerance is not None and error > settings.tolerance:
             raise InputError(
-                f"export: axis {axis}: what is written is off by {short(error)} deg/h from the model at "
-                f"rest, more than the tolerance of {short(settings.tolerance)} deg/h. Nothing was written"
+                f"export: axis {axis}: what is written is off by {against(error, settings.tolerance)} deg/h "
+                f"from the model at rest, more than the tolerance of {stated(settings.tolerance)} deg/h. "
+                "Nothing was written"
             )
     return {
         "schema": SCHEMA,

@@ -151,7 +151,7 @@ def _outliers(
 
 
 def _again(units: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
-    """Units that need another run, and why."""
+    """Units that need attention, such as another run, and why."""
     told = []
     for unit in units:
         why = _why_again(unit)

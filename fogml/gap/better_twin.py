@@ -18,7 +18,7 @@ from fogml.gap.result_parts import Counterfactual, Course
 from fogml.gap.rows import READ
 from fogml.gap.step_settings import Reported
 from fogml.gap.where import averages
-from fogml.numerals import short
+from fogml.numerals import with_error
 from fogml.runs.run import Run
 from fogml.signals.noise_expectation import floor_square
 from fogml.twin.draws import parameter_values
@@ -123,7 +123,7 @@ def better_twin(
         deviations = scale * np.sqrt(np.diag(fitted.covariance))
         units = {f"plant.{quantity.name}": quantity.unit for quantity in QUANTITIES}
         sizes = ", ".join(
-            f"{name.removeprefix('plant.')} {short(value)} ± {short(sd, 2)} {units.get(name, '')}".rstrip()
+            f"{name.removeprefix('plant.')} {with_error(value, sd)} {units.get(name, '')}".rstrip()
             for name, value, sd in zip(fitted.names, scale, deviations)
         )
         told.append(f"Plant fitted to recorded temperatures: {sizes}")

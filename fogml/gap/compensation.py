@@ -22,7 +22,7 @@ from fogml.gap.posterior import Cause
 from fogml.gap.result_parts import Compensable, Compensation
 from fogml.gap.scene import Scene
 from fogml.gap.settings import STANDARD, Priors
-from fogml.numerals import short
+from fogml.numerals import ascii_number
 from fogml.twin.effect import Effect
 from fogml.twin.inputs import REST, STAND_INS
 
@@ -148,7 +148,10 @@ def _span(declared: Effect, form: Form, recorded: Recorded) -> list[str]:
         case "loops":
             width = form.get("half_width")
             widths = grids.half_widths_degc if width is None else (0.7 * width, width, 1.4 * width)
-            return [*(f"play({x}, {short(w, 4)} degC)^1..{reported.loop_powers}" for w in widths), f"({x})^3"]
+            return [
+                *(f"play({x}, {ascii_number(w, 4)} degC)^1..{reported.loop_powers}" for w in widths),
+                f"({x})^3",
+            ]
         case "warm_up":
             return [f"since_on({tau:g} s)" for tau in grids.warm_ups_s] if recorded.powered_on else []
         case "wave":

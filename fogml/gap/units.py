@@ -25,7 +25,7 @@ from fogml.gap.model import AnyModel
 from fogml.gap.result import Diagnosis, Estimate
 from fogml.gap.search import Explanation
 from fogml.gap.settings import Priors
-from fogml.numerals import probability_words, short
+from fogml.numerals import probability_words, short, with_error
 from fogml.runs.run import Run
 from fogml.signals.restricted import next_value, random_effects
 from fogml.twin.twin import Twin
@@ -81,12 +81,12 @@ class UnitsDiagnosis:
         """What is shared, in sentences."""
         said = []
         for c in self.shared:
-            sizes = ", ".join(f"{u} {short(s.value)} ± {short(s.se, 2)}" for u, s in c.sizes.items())
+            sizes = ", ".join(f"{u} {with_error(s.value, s.se)}" for u, s in c.sizes.items())
             line = f"{c.effect}: {probability_words(c.probability)} probable in all units; {sizes} {c.unit}"
             if c.next_unit is not None and c.mean is not None:
                 low, high = c.next_unit
                 line += (
-                    f"; mean {short(c.mean.value)} ± {short(c.mean.se, 2)}, {short(c.spread, 2)} from unit "
+                    f"; mean {with_error(c.mean.value, c.mean.se)}, {short(c.spread, 2)} from unit "
                     f"to unit: the next unit's lies between {short(low)} and {short(high)} {c.unit} (90 %)"
                 )
             said.append(line + ".")

@@ -249,7 +249,7 @@ def _verdict(
     if not limits.by_quantity:
         return NO_LIMITS, [*still, "nothing is accepted or rejected"]
     limited = [row for row in rows if row["limit"] is not None]
-    missed = [f"{row['name']} is over its limit" for row in limited if row["met"] is False]
+    missed = [f"{row['name']} is {_beyond(row)} its limit" for row in limited if row["met"] is False]
     lacking = [_lacking(row) for row in limited if row["met"] is None]
     fitted = [f"{name} is a training run of the model, which says nothing of another run" for name in seen]
     if missed:
@@ -257,6 +257,11 @@ def _verdict(
     if still or lacking or fitted:
         return INCOMPLETE, [*still, *lacking, *fitted]
     return ACCEPTED, [f"all {len(limited)} limits are met"]
+
+
+def _beyond(row: Mapping[str, Any]) -> str:
+    figure, low = row["before"] if row["after"] is None else row["after"], row["limit"]["from"]
+    return "below" if low is not None and figure < low else "over"
 
 
 def _lacking(row: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from fogml.errors import InputError, listed
 from fogml.lab.acceptance_rows import TERMS, Limit, Limits
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_pieces import earth_deg_h, find_plateaus, merged
-from fogml.numerals import short
+from fogml.numerals import number
 from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
 from fogml.runs.turning import least_rate_deg_s, white_noise
@@ -240,7 +240,9 @@ def _over(found: Repeatability) -> str:
 
 def _repeated(found: SpreadOverRuns, over: str) -> Figure:
     low, high = found.after_ci90
-    return Figure(found.before, found.after, over, f"90 % of {short(low)} to {short(high)}", ci90=(low, high))
+    return Figure(
+        found.before, found.after, over, f"90 % of {number(low)} to {number(high)}", ci90=(low, high)
+    )
 
 
 def small_rates(run: Run) -> bool:
@@ -276,7 +278,7 @@ def _of_rates(before: Sequence[Run], after: Sequence[Run]) -> Iterator[tuple[str
         sizes = [below or above for below, above in ends if below or above]
         if len(sizes) == len(told):
             seen, over = ends[1]
-            remark = f"above {short(over)}" if over else "the smallest that was tested"
+            remark = f"above {number(over)}" if over else "the smallest that was tested"
             if not seen:
                 remark = "none as small as that shows, and none above was tested"
             was, now = sizes
@@ -301,7 +303,7 @@ def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) ->
         terms = [one[letter] for one in told]
         (_, high), (low, most) = (term["ci"] for term in terms)
         if all(term["value"] is not None for term in terms):
-            remark = f"90 % of {short(low)} to {short(most)}"
+            remark = f"90 % of {number(low)} to {number(most)}"
             values = (terms[0]["value"], terms[1]["value"])
             yield key, Figure(*values, pair[0].name, remark, ci90=(low, most))
         elif all(term["ci"][1] for term in terms):

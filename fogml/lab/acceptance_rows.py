@@ -40,6 +40,8 @@ class Quantity:
         Clause of IEEE Std 952-1997, where a public source cites it.
     called
         Its name in IEEE Std 952, where that is not its own without what of it is told.
+    signed
+        Whether a figure of it may be negative.
     """
 
     key: str
@@ -49,6 +51,7 @@ class Quantity:
     needs: str
     clause: str = ""
     called: str = ""
+    signed: bool = False
 
     @property
     def ieee_952(self) -> str:
@@ -71,7 +74,7 @@ _POWER_ON = "a stated power-on (powered_on) and a band (--turn-on-band)"
 _OFTEN = "a sample in 5 s or more often"
 
 QUANTITIES = (
-    Quantity("bias", "Bias", "零偏", "deg/h", _RESTS),
+    Quantity("bias", "Bias", "零偏", "deg/h", _RESTS, signed=True),
     Quantity("bias_stability", "Bias stability, of the averages", "零偏稳定性", "deg/h", _RESTS),
     Quantity("bias_stability_10s", "Bias stability, 10 s averages", "零偏稳定性", "deg/h", _OFTEN),
     Quantity("bias_repeatability", "Bias repeatability", "零偏重复性", "deg/h", _CYCLES),
@@ -81,15 +84,31 @@ QUANTITIES = (
     Quantity(
         "hysteresis", "Thermal hysteresis of the bias", "", "deg/h", _BOTH_WAYS, called="thermal hysteresis"
     ),
-    Quantity("scale_factor_error", "Scale factor error", "标度因数", "ppm", _RATES, called="scale factor"),
+    Quantity(
+        "scale_factor_error",
+        "Scale factor error",
+        "标度因数",
+        "ppm",
+        _RATES,
+        called="scale factor",
+        signed=True,
+    ),
     Quantity("scale_factor_nonlinearity", "Scale factor nonlinearity", "标度因数非线性度", "ppm", _LADDER),
-    Quantity("scale_factor_asymmetry", "Scale factor asymmetry", "标度因数不对称性", "ppm", _BOTH_SENSES),
+    Quantity(
+        "scale_factor_asymmetry",
+        "Scale factor asymmetry",
+        "标度因数不对称性",
+        "ppm",
+        _BOTH_SENSES,
+        signed=True,
+    ),
     Quantity(
         "scale_factor_temperature_sensitivity",
         "Scale factor temperature sensitivity",
         "标度因数温度灵敏度",
         "ppm/degC",
         _TURNS_IN_SOAKS,
+        signed=True,
     ),
     Quantity(
         "scale_factor_repeatability",

@@ -10,7 +10,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.lab.north import DriftError, horizontal_rate
 from fogml.lab.north_schemes import wrapped
-from fogml.numerals import short
+from fogml.numerals import short, with_error
 from fogml.runs.run import Run
 from fogml.runs.settling import LEAST_ROWS, unsettled_rows
 
@@ -145,8 +145,8 @@ def fix_notes(fix: NorthFix, covariance: FloatArray | None, left: LeftIn | None)
         which = "the bend taken out (--method bend-observing)" if straight else "a cube of time taken out"
         told.append(
             f"the bias bends{how} during the seek, as at start-up ({shows:.1f} standard errors), which the "
-            f"azimuth's standard error does not hold: with {which} it is {left.azimuth_deg:.4f} ± "
-            f"{short(left.azimuth_se_deg, 2)} deg"
+            f"azimuth's standard error does not hold: with {which} it is "
+            f"{with_error(left.azimuth_deg, left.azimuth_se_deg)} deg"
         )
     return told
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.numerals import short
+from fogml.numerals import ascii_number
 from fogml.runs.facts import Direction, Facts
 from fogml.runs.run import Run
 from fogml.twin.noise import NoiseConstants
@@ -91,7 +91,7 @@ def rate_runs(
     runs = [_run(twin, name, steps, sample, seed) for name, steps, sample in programmes]
     for hertz in frequencies.tolist():
         step = Hold(CYCLES / hertz, (Oscillate(OSCILLATION_DEG_S, hertz, CYCLES / hertz),))
-        runs.append(_run(twin, f"{short(hertz, 4)} Hz", (step,), 1.0 / (POINTS_A_CYCLE * hertz), seed))
+        runs.append(_run(twin, f"{ascii_number(hertz, 4)} Hz", (step,), 1.0 / (POINTS_A_CYCLE * hertz), seed))
     turn = Turn(((FLANK_SHARE * greatest_deg_s, None),), 0.1 * FLANK_S)
     return [*runs, _run(twin, "step", (Hold(FLANK_S, (turn,)),), FLANK_SAMPLE_S, seed)]
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from fogml.lab.rate_response import HALF_POWER
-from fogml.numerals import number, unit_words, with_error
+from fogml.numerals import in_two, number, unit_words, with_error
 
 
 class ResultRow(NamedTuple):
@@ -28,8 +28,7 @@ def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
         if line["nonlinearity_ppm"] is not None:
             straight = f", linear within {number(line['nonlinearity_ppm'])} ppm"
         reach = "" if held is None else f" up to {number(held['followed_deg_s'])} deg/s"
-        ends = None if line["ci90"] is None else [1e6 * (end - 1.0) for end in line["ci90"]]
-        off = _within_90(1e6 * (line["scale_factor"] - 1.0), ends, "ppm")
+        off = _within_90(1e6 * (line["scale_factor"] - 1.0), _ppm_off(line), "ppm")
         sentences.append(f"The scale factor is {off} off the nominal one{straight}{reach}.")
         if held is not None and held["exceeded_deg_s"] is not None:
             sentences.append(f"At {number(held['exceeded_deg_s'])} deg/s the output no longer follows.")
@@ -58,9 +57,14 @@ def _rows(values: Mapping[str, Any]) -> list[ResultRow]:
     rows = []
     line = values["scale_factor"]
     if line is not None:
-        ppm = f"{1e6 * (line['scale_factor'] - 1.0):+.1f} ppm".replace("-", "\N{MINUS SIGN}")
-        ppm += _within(line["ci90"], 1e6, "ppm")
-        rows.append(ResultRow("scale factor", f"{line['scale_factor']:.7f}", number(line["se"]), "1", ppm))
+        off = 1e6 * (line["scale_factor"] - 1.0)
+        ppm = f"{'+' if off > 0.0 else ''}{_within_90(off, _ppm_off(line), 'ppm')}"
+        told = f"{line['scale_factor']:.7f}", number(line["se"])
+        rows.append(
+            ResultRow(
+                "scale factor", *(in_two(line["scale_factor"], line["se"]) if line["se"] else told), "1", ppm
+            )
+        )
         for name, words in (("nonlinearity", _from_to), ("asymmetry", _plus_minus)):
             if line[f"{name}_ppm"] is not None:
                 remark = words(line[f"{name}_ci90_ppm"])
@@ -82,10 +86,10 @@ def _rows(values: Mapping[str, Any]) -> list[ResultRow]:
     rows += _response(values)
     sensed = values["temperature_sensitivity"]
     if sensed is not None:
-        slope = number(sensed["ppm_per_degC"])
         remark = f"over {len(sensed['temperature'])} temperatures"
-        remark += _within(sensed["ci90"], 1.0, "ppm/°C")
-        rows.append(ResultRow("temperature sensitivity", slope, number(sensed["se"]), "ppm/degC", remark))
+        remark += f", {_plus_minus(sensed['ci90'], 'ppm/°C')}" if sensed["ci90"] is not None else ""
+        told = in_two(sensed["ppm_per_degC"], sensed["se"])
+        rows.append(ResultRow("temperature sensitivity", *told, "ppm/degC", remark))
         if sensed["curvature_ppm_per_degC2"] is not None:
             curve = number(sensed["curvature_ppm_per_degC2"])
             rows.append(ResultRow("its curvature", curve, "", "ppm/degC2", ""))
@@ -94,15 +98,14 @@ def _rows(values: Mapping[str, Any]) -> list[ResultRow]:
     return rows
 
 
-def _within(ends: Sequence[float] | None, scale: float, unit: str) -> str:
-    """``, 90 %: ± 0.3 ppm``."""
-    if ends is None:
-        return ""
-    return f", 90 %: ± {number(0.5 * scale * (ends[1] - ends[0]))} {unit}"
+def _ppm_off(line: Mapping[str, Any]) -> list[float] | None:
+    """The ends of the scale factor's interval, in ppm off the nominal one."""
+    return None if line["ci90"] is None else [1e6 * (end - 1.0) for end in line["ci90"]]
 
 
-def _plus_minus(ends: Sequence[float] | None) -> str:
-    return _within(ends, 1.0, "ppm").removeprefix(", ")
+def _plus_minus(ends: Sequence[float] | None, unit: str = "ppm") -> str:
+    """``90 %: ± 0.30 ppm``."""
+    return "" if ends is None else f"90 %: ± {number(0.5 * (ends[1] - ends[0]), 2)} {unit}"
 
 
 def _from_to(ends: Sequence[float] | None) -> str:
@@ -134,7 +137,11 @@ def _response(values: Mapping[str, Any]) -> list[ResultRow]:
     if limit is not None:
         remark = f"the table has {number(limit['table_deg_s2'])} deg/s²"
         name = "slew" if limit["limited"] else "slew, at least"
-        rows.append(ResultRow(name, number(limit["output_deg_s2"]), "", "deg/s2", remark))
+        # What the output shows beyond the table's own is its noise.
+        told = (
+            limit["output_deg_s2"] if limit["limited"] else min(limit["output_deg_s2"], limit["table_deg_s2"])
+        )
+        rows.append(ResultRow(name, number(told), "", "deg/s2", remark))
     return rows
 
 

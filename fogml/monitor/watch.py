@@ -17,7 +17,7 @@ from fogml.monitor.changes import Chart, Shape, change_chart
 from fogml.monitor.evidence import ChangePrior
 from fogml.monitor.record import FIGURES, RunRecord
 from fogml.monitor.trend import trend_interval
-from fogml.numerals import in_order_of_serial
+from fogml.numerals import in_order_of_serial, plural
 
 DAY_S = 86400.0
 NEAREST: dict[tuple[str, Shape], tuple[str, ...]] = {
@@ -207,9 +207,8 @@ def _watched(
         state = "baseline"
     if since <= prior.baseline_runs:
         notes.append(
-            f"{since} of {prior.baseline_runs + 1} runs since "
-            + ("the change" if chart.changes else "the first")
-            + ": no change can be told yet"
+            f"{plural(since, 'run')} {'since the change' if chart.changes else 'so far'}: no change can be "
+            f"told yet, {prior.baseline_runs + 2} are the least that tell one"
         )
     # Of a run outside training the interval is wider than the model states it.
     limit = bias_limit or min(record.half_width for record in records)

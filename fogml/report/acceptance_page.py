@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from fogml.numerals import MISSING, listed, number, percent, plural, short, stated, unit_words
+from fogml.lab.acceptance_rows import BY_KEY
+from fogml.numerals import MISSING, against, listed, number, percent, plural, short, stated, unit_words
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import Tile, render
@@ -50,25 +51,33 @@ def named(values: Mapping[str, Any]) -> str:
     return f"{unit}, axis {axis}" if axis else str(unit)
 
 
-def limit_words(limit: Mapping[str, float | None] | None) -> str:
-    """A limit as people write it."""
-    if limit is None:
+def limit_words(told: Mapping[str, Any]) -> str:
+    """The limit of a quantity as people write it."""
+    if told["limit"] is None:
         return ""
-    low, high = limit["from"], limit["to"]
-    if low is None or high is None:
-        return f"≤ {stated(high)}" if low is None and high is not None else f"≥ {stated(low or 0.0)}"
-    return f"± {stated(high)}" if low == -high else f"{stated(low)} … {stated(high)}"
+    low, high = told["limit"]["from"], told["limit"]["to"]
+    if low is None:
+        return f"≤ {stated(high)}"
+    if high is None:
+        return f"≥ {stated(low)}"
+    if low == -high:
+        return f"{'±' if BY_KEY[told['quantity']].signed else '≤'} {stated(high)}"
+    return f"{stated(low)} … {stated(high)}"
 
 
 def figure_words(row: Mapping[str, Any], when: str) -> str:
     """A row's figure as people write it: one that is only known to be no more or less with its sign."""
-    return bounded(row[when], bool(row.get("at_most")), bool(row.get("at_least")))
+    return bounded(row[when], bool(row.get("at_most")), bool(row.get("at_least")), row["limit"])
 
 
-def bounded(value: float | None, at_most: bool, at_least: bool) -> str:
+def bounded(
+    value: float | None, at_most: bool, at_least: bool, limit: Mapping[str, float | None] | None = None
+) -> str:
     """A figure, with the sign of what is only known to be no more, or no less; bare where both are mixed."""
-    sign = "" if value is None or at_most == at_least else "≤ " if at_most else "≥ "
-    return f"{sign}{number(value)}"
+    if value is None:
+        return number(value)
+    sign = "" if at_most == at_least else "≤ " if at_most else "≥ "
+    return f"{sign}{against(value, *(limit or {}).values())}"
 
 
 def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -84,7 +93,7 @@ def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
         "tested": row["tested"],
         "before": figure_words(row, "before"),
         "after": figure_words(row, "after"),
-        "limit": limit_words(row["limit"]),
+        "limit": limit_words(row),
         "kind": outcome[0],
         "outcome": outcome[1],
         "remark": ", ".join(part for part in (row["of"], row["remark"]) if part),
@@ -247,8 +256,11 @@ def distribution_table(values: Mapping[str, Any]) -> Table:
             one["name"],
             unit_words(one["unit"]),
             str(one["tested"]),
-            *(bounded(one["distribution"][p], bool(one["at_most"]), bool(one["at_least"])) for p in parts),
-            "they differ" if one["limits_differ"] else limit_words(one["limit"]) or MISSING,
+            *(
+                bounded(one["distribution"][p], bool(one["at_most"]), bool(one["at_least"]), one["limit"])
+                for p in parts
+            ),
+            "they differ" if one["limits_differ"] else limit_words(one) or MISSING,
             str(one["over"]),
         )
         for one in values["quantities"]
@@ -265,9 +277,10 @@ def _units(units: Sequence[Mapping[str, Any]], shown: Sequence[Mapping[str, Any]
     for unit in units:
         kind, sign, words = VERDICTS[unit["verdict"]]
         name = " ".join(part for part in (unit["serial_number"], unit["axis"]) if part)
+        limits = {one["quantity"]: one["limit"] for one in shown}
         figures = {one["quantity"]: unit["figures"].get(one["quantity"]) for one in shown}
         told = [
-            bounded(figure, key in unit["at_most"], key in unit["at_least"])
+            bounded(figure, key in unit["at_most"], key in unit["at_least"], limits[key])
             + (" ✗" if key in unit["missed"] else "")
             for key, figure in figures.items()
         ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from fogml.numerals import MISSING, averages, duration, number, percent
+from fogml.numerals import MISSING, averages, duration, number, percent, with_error
 from fogml.report.acceptance_page import VERDICTS, limit_words
 from fogml.report.page import render
 from fogml.report.tables import Table, columns_of
@@ -114,7 +114,7 @@ def _noise(told: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _acceptance(told: Mapping[str, Any]) -> tuple[str, ...]:
     tested = [row for row in told["rows"] if row["tested"]]
-    missed = [f"{row['name']} ({limit_words(row['limit'])})" for row in tested if row["met"] is False]
+    missed = [f"{row['name']} ({limit_words(row)})" for row in tested if row["met"] is False]
     limited = [row for row in told["rows"] if row["limit"] is not None]
     return (
         f"{len(tested)} of {len(told['rows'])}",
@@ -204,4 +204,4 @@ def _shared(causes: Sequence[Mapping[str, Any]], units: Sequence[str]) -> Table:
 
 
 def _size(told: Mapping[str, Any] | None) -> str:
-    return MISSING if told is None else f"{number(told['value'])} ± {number(told['se'], 2)}"
+    return MISSING if told is None else with_error(told["value"], told["se"])

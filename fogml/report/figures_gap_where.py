@@ -97,8 +97,8 @@ def by_timescale(items: Sequence[TimescaleExcess]) -> Drawing:
     )
 
 
-def by_stage(shares: Sequence[Share]) -> Drawing:
-    """Shares of the structural gap by stage of the chain."""
+def by_stage(shares: Sequence[Share], is_named: bool) -> Drawing:
+    """Shares of the structural gap by stage of the chain; `is_named` tells whether any cause is."""
     labels = [_STAGE_WORDS.get(s.name, s.name.replace("_", " ")) for s in shares]
     values = [100.0 * s.share for s in shares]
     figure = go.Figure(
@@ -121,7 +121,9 @@ def by_stage(shares: Sequence[Share]) -> Drawing:
         alt="Share of the structural gap by stage: "
         + "; ".join(f"{w} {percent(s.share)}" for w, s in zip(labels, shares, strict=True))
         + ".",
-        caption="By stage of the chain in which what was found acts.",
+        caption="By stage of the chain in which what was found acts."
+        if is_named
+        else "By stage of the chain in which what is left would act, by its looks: no cause is named.",
         half=True,
     )
 

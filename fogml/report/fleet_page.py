@@ -93,7 +93,7 @@ def _verdict(fleet: Mapping[str, Any]) -> list[str]:
         sentences.append(f"{plural(failed, what)} could not be done.")
     again = {item["unit"] for item in fleet["again"]}
     if again:
-        sentences.append(f"{plural(len(again), 'unit needs', 'units need')} another run.")
+        sentences.append(f"{plural(len(again), 'unit needs', 'units need')} attention.")
     return sentences
 
 
@@ -119,7 +119,7 @@ def _tiles(fleet: Mapping[str, Any]) -> list[Tile]:
             ends = f"{number(spread[key]['q10'])} … {number(spread[key]['q90'])}"
             tiles.append(Tile(f"{words}, median", number(spread[key]["median"]), "deg/h", f"8 in 10: {ends}"))
     tiles.append(Tile("Unlike the others", str(len({item["unit"] for item in fleet["outliers"]}))))
-    tiles.append(Tile("Need another run", str(len({item["unit"] for item in fleet["again"]}))))
+    tiles.append(Tile("Need attention", str(len({item["unit"] for item in fleet["again"]}))))
     return tiles
 
 

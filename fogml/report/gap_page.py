@@ -78,7 +78,7 @@ def gap_page(found: Diagnosis) -> str:
         by_regime=figures_gap_where.by_regime(where.regime) if where.regime else None,
         by_timescale=figures_gap_where.by_timescale(where.timescale) if where.timescale else None,
         by_temperature=figures_gap_where.by_temperature(where.temperature) if where.temperature else None,
-        by_stage=figures_gap_where.by_stage(where.stage) if where.stage else None,
+        by_stage=figures_gap_where.by_stage(where.stage, bool(found.named)) if where.stage else None,
         regimes=gap_tables.regimes_table(found) if where.regime else None,
         segments=gap_tables.segments_table(found),
         shares=gap_tables_ahead.shares_table(found, names),

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from fogml.numerals import MISSING, listed, number, percent, plural, stated
+from fogml.arrays import FloatArray
+from fogml.numerals import MISSING, in_two, listed, number, percent, plural, stated
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import Row, Table
@@ -90,10 +91,12 @@ def result_table(values: Mapping[str, Any]) -> Table:
     ):
         ends = intervals.get(key)
         span = MISSING if ends is None else _span(*ends)
-        rows.append((label, number(values[key], 8), number(se.get(key)), span, unit))
+        told = in_two(values[key], se[key]) if se.get(key) else (number(values[key], 8), MISSING)
+        rows.append((label, *told, span, unit))
     errors = se.get("fixture_error_deg") or [None, None]
     for axis, value, error in zip("xy", values["fixture_error_deg"], errors):
-        rows.append((f"Zero error of the fixture, {axis}", number(value, 5), number(error), MISSING, "deg"))
+        told = in_two(value, error) if error else (number(value, 5), MISSING)
+        rows.append((f"Zero error of the fixture, {axis}", *told, MISSING, "deg"))
     return Table(
         f"Quantity | >Value | >Standard error | >{percent(values['level'], 0)} interval | Unit",
         rows,
@@ -182,8 +185,9 @@ def region_figure(values: Mapping[str, Any]) -> Drawing | None:
     figure.add_trace(style.line(outline[:, 0], outline[:, 1], words, style.BLUE, 1.4, **filled))
     there = [values["delta_x_deg"]], [values["delta_y_deg"]]
     figure.add_trace(style.points(*there, "four states", style.BLUE, "cross", 11))
-    figure.update_xaxes(title_text="misalignment x [deg]", nticks=5)
-    figure.update_yaxes(title_text="misalignment y [deg]")
+    across, up = (_with_room(outline[:, axis]) for axis in (0, 1))
+    figure.update_xaxes(title_text="misalignment x [deg]", nticks=5, range=across)
+    figure.update_yaxes(title_text="misalignment y [deg]", range=up)
     style.styled(figure, 420)
     long, short = region["half_axes_deg"]
     return Drawing(
@@ -196,3 +200,9 @@ def region_figure(values: Mapping[str, Any]) -> Drawing | None:
         caption="Both components at once lie in the ellipse at the stated confidence.",
         half=True,
     )
+
+
+def _with_room(values: FloatArray, room: float = 0.08) -> list[float]:
+    """Ends of an axis that leave a share of what it shows free on either side."""
+    free = room * float(np.ptp(values))
+    return [float(values.min()) - free, float(values.max()) + free]

@@ -8,7 +8,7 @@ from typing import Any
 
 from fogml.fleet.summary import label_of
 from fogml.folders import safe_name
-from fogml.numerals import in_order_of_serial, number, percent, plural
+from fogml.numerals import against, in_order_of_serial, number, percent, plural, stated
 from fogml.report.monitor_words import (
     FIGURE_WORDS,
     alarm_words,
@@ -51,7 +51,7 @@ def monitor_page(monitor: Mapping[str, Any]) -> str:
         )
     verdict.append(
         f"{plural(len(units), 'unit')} with {plural(runs, 'run')}; where runs are alike and "
-        f"independent, one in {every:g} gives a false alarm, at most."
+        f"independent, one in {stated(every)} gives a false alarm, at most."
     )
     verdict.append(
         "A bias that wanders as flicker counts as no change, so that steps of a few deviations are found "
@@ -95,7 +95,9 @@ def unit_page(unit: Mapping[str, Any], limit: float) -> str:
         tiles=[
             Tile("Runs", str(len(unit["runs"]))),
             Tile("Bias left, last run", number(last["level"]), "deg/h"),
-            Tile("Evidence of change", number(unit["statistic"][-1]), "", f"alarm at {limit:g}"),
+            Tile(
+                "Evidence of change", against(unit["statistic"][-1], limit), "", f"alarm at {stated(limit)}"
+            ),
             Tile("Outside training, last run", percent(last["outside_training"])),
             *(
                 []

@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 
 from fogml.fleet.summary import label_of
 from fogml.intervals import Z90
-from fogml.numerals import number, plural, short
+from fogml.numerals import number, plural, stated
 from fogml.report import style
 from fogml.report.figures_fleet import serial_axis
 from fogml.report.page import Drawing
@@ -198,9 +198,12 @@ def shown_figure(run: Mapping[str, Any], name: str) -> float | None:
     return math.exp(value) if name == "scatter" and value is not None else value
 
 
+_LEAST_DRAWN = 1e-2  # of an evidence, on an axis that has no zero
+
+
 def evidence(unit: Mapping[str, Any], limit: float) -> Drawing:
     """The evidence of change after each run, against the limit."""
-    values = [max(value, 1e-2) for value in unit["statistic"]]
+    values = [max(value, _LEAST_DRAWN) for value in unit["statistic"]]
     curve = style.line(
         unit["age"], values, "evidence of change", style.BLUE, 2, mode="lines+markers", marker={"size": 6}
     )
@@ -212,9 +215,11 @@ def evidence(unit: Mapping[str, Any], limit: float) -> Drawing:
     style.styled(figure, 300)
     return Drawing(
         figure,
-        alt=f"Evidence of change after each run, at most {short(max(values))}, against a limit of {limit:g}.",
+        alt=f"Evidence of change after each run, at most {number(max(unit['statistic']))}, "
+        f"against a limit of {stated(limit)}.",
         caption=(
-            f"Where nothing changes, the evidence passes the limit once in {limit:g} runs or less often. "
+            f"Where nothing changes, the evidence passes the limit once in {stated(limit)} runs or less "
+            f"often. What is below {stated(_LEAST_DRAWN)} is drawn there; the first runs tell no evidence. "
             "After an alarm it begins anew with the runs since the change."
         ),
     )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from fogml.numerals import MISSING, duration, listed, number, percent, stated, to_error
+from fogml.numerals import MISSING, duration, listed, number, percent, stated, to_error, with_error
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import Row, Table, noticed
@@ -50,7 +50,7 @@ def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
         if share is not None:
             bent = f", and by {percent(share, 0)} its bend, as probable as that is,"
         sentences.append(
-            f"A linear drift of {number(drift)} ± {number(values['drift_se'], 2)} deg/h "
+            f"A linear drift of {with_error(drift, values['drift_se'])} deg/h "
             f"per h{bent} is taken out; a plain seek is {number(values['error_deg'])} deg from this one."
         )
     elif drift is not None:
@@ -168,15 +168,20 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
             ("linear drift", f"{stated(drift['linear_deg_h_per_h'])} deg/h per h"),
             ("transients", listed(transients) or MISSING),
             ("angle random walk", f"{stated(values['random_walk_deg_sqrt_h'])} deg/√h"),
-            ("closed form less simulation", f"{number(difference, 2)} deg"),
+            ("closed form less simulation", _but_rounding(difference)),
         ]
     else:
         rows += [
             ("offset", f"{number(values['offset_deg_h'], 4)} deg/h"),
             ("noise of a sample", f"{number(values['sample_noise_deg_h'])} deg/h"),
-            ("plain seek", f"{values['plain_azimuth_deg']:.4f} deg"),
+            ("plain seek", f"{to_error(values['plain_azimuth_deg'], values['se'])} deg"),
         ]
     return rows
+
+
+def _but_rounding(difference_deg: float) -> str:
+    """A difference of two angles; that of their last bits is none that anybody can see."""
+    return "under 10⁻⁹ deg" if abs(difference_deg) < 1e-9 else f"{number(difference_deg, 2)} deg"
 
 
 def _angles(angles: Sequence[float], form: str) -> str:

@@ -114,6 +114,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["number"] = numerals.number
+    environment.filters["against"] = numerals.against
     environment.filters["stated"] = numerals.stated
     environment.filters["percent"] = numerals.percent
     environment.filters["probability"] = numerals.probability_words

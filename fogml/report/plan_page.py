@@ -9,7 +9,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from fogml.gap.result_parts import Rehearsed
-from fogml.numerals import MISSING, duration, listed, number, plural, stated
+from fogml.numerals import MISSING, duration, listed, number, plural, stated, unit_words
 from fogml.report import style
 from fogml.report.gap_tables import CONSTANTS
 from fogml.report.gap_tables_ahead import rehearsal_table
@@ -185,7 +185,9 @@ def _tiles(values: Mapping[str, Any]) -> list[Tile]:
         note = f"{', '.join(item['separates'])}; from {stated(values['least_distance'])} on"
         tiles.append(Tile(name, number(item["distance"]), "", note, kind))
     for error in values["wanted"][:4]:
-        tiles.append(Tile(error["name"], number(error["se"]), error["unit"], "expected standard error"))
+        tiles.append(
+            Tile(error["name"], number(error["se"]), unit_words(error["unit"]), "expected standard error")
+        )
     return tiles
 
 
@@ -196,7 +198,7 @@ def wanted_table(values: Mapping[str, Any]) -> Table | None:
     rows = [
         (
             f"{e['name']}: {CONSTANTS[e['name']]}" if e["name"] in CONSTANTS else e["name"],
-            e["unit"],
+            unit_words(e["unit"]),
             number(e["usual"]),
             number(e["prior_se"]),
             number(e["se"]),
@@ -246,7 +248,7 @@ def _separations(values: Mapping[str, Any]) -> Table | None:
 def _alternatives(run: Mapping[str, Any]) -> Table | None:
     if not run["alternatives"]:
         return None
-    wanted = [(e["name"], e["unit"]) for e in run["wanted"]][:5]
+    wanted = [(e["name"], unit_words(e["unit"])) for e in run["wanted"]][:5]
     groups = [", ".join(s["separates"]) for s in run["separations"]]
 
     def row(told: Mapping[str, Any], mark: str) -> Row:

@@ -9,7 +9,7 @@ from typing import Any
 
 from fogml.escaping import cell_text
 from fogml.lab.batch import BOUNDS
-from fogml.report.acceptance_page import VERDICTS, files_of, limit_words, named
+from fogml.report.acceptance_page import VERDICTS, files_of, named
 from fogml.report.spreadsheet import whole_workbook
 
 _HEADS = ("quantity", "name", "IEEE Std 952", "clause", "GJB 2426A", "unit", "before", "after")
@@ -74,14 +74,17 @@ def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
             for one in values["units"]
         ]
         writer.table_sheet("Units", heads, rows, (18,)).freeze_panes(1, 1)
-        same = ("unit", "tested", "least", "q10", "median", "q90", "largest", "limit", "over", *BOUNDS)
-        told = [
-            {**one, **one["distribution"]}
-            | {"limit": "they differ" if one["limits_differ"] else limit_words(one["limit"])}
-            for one in values["quantities"]
-        ]
+        shares = ("least", "q10", "median", "q90", "largest")
+        same = ("unit", "tested", *shares, "limit_from", "limit_to", "over", *BOUNDS)
+        told = [{**one, **one["distribution"], **_ends(one)} for one in values["quantities"]]
         names = {"name": "quantity", **{key: key.replace("_", " ") for key in same}}
         writer.table_sheet("Distribution", names, told, (18,))
+
+
+def _ends(quantity: Mapping[str, Any]) -> dict[str, float | str | None]:
+    """The ends of a quantity's limit."""
+    limit = dict.fromkeys(("from", "to"), "they differ" if quantity["limits_differ"] else None)
+    return {f"limit_{end}": told for end, told in (quantity["limit"] or limit).items()}
 
 
 _UNIT_COLUMNS = {
@@ -123,6 +126,6 @@ def fleet_spreadsheet(fleet: Mapping[str, Any], path: str | Path) -> None:
             table = zip(found["units"], found["values"], found["se"], found["distance"], strict=True)
             rows = [[unit, *own, *se, far] for unit, own, se, far in table]
             writer.table_sheet("Constants", names, rows, (16,)).freeze_panes(1, 1)
-        noticed = [(item["unit"], "needs another run", item["why"]) for item in fleet["again"]]
+        noticed = [(item["unit"], "needs attention", item["why"]) for item in fleet["again"]]
         noticed += [(item["unit"], "unlike the others", item["why"]) for item in fleet["outliers"]]
         writer.table_sheet("Noticed", ("unit", "what", "why"), noticed, (20, 20, 100))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.numerals import averages, listed, number, percent, plural, stated, unit_of
+from fogml.numerals import against, averages, listed, number, percent, plural, stated, unit_of
 from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import (
@@ -108,7 +108,7 @@ def headline_tiles(judgement: Judgement) -> list[Tile]:
         tiles.append(
             Tile(
                 "Design index",
-                number(index.value),
+                against(index.value, index.limit),
                 "deg/h",
                 f"{'✓ met' if index.met else '✗ not met'}, limit {stated(index.limit)}",
                 "met" if index.met else "missed",

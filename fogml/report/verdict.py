@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.numerals import averages, label, listed, number, percent, plural, stated, unit_of
+from fogml.numerals import against, averages, label, listed, number, percent, plural, stated, unit_of
 from fogml.report.tables import reference_of
 from fogml.validation.advice import SEEN, Advice, Asked
 from fogml.validation.floors import left_is_noise
@@ -172,7 +172,8 @@ def _limits(outcomes: Sequence[LimitOutcome]) -> list[str]:
         count = {1: "The stated limit is", 2: "Both stated limits are"}
         return [count.get(len(outcomes), f"All {len(outcomes)} stated limits are") + " met."]
     described = [
-        f"{label(o.quantity).lower()} {number(o.value)}, limit {stated(o.limit)} {unit_of(o.quantity)}"
+        f"{label(o.quantity).lower()} {against(o.value, o.limit)}, limit {stated(o.limit)} "
+        f"{unit_of(o.quantity)}"
         for o in missed
     ]
     return [f"Not met: {'; '.join(described)}."]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import FiniteFloat, field_validator, model_validator
 
 from fogml.errors import InputError
-from fogml.numerals import short
+from fogml.numerals import ascii_number
 from fogml.strict import Strict
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ class Space(Strict):
 
 def window_text(seconds: float) -> str:
     """A window's length to three significant digits, as feature text takes it."""
-    return f"{float(short(seconds)):g}"
+    return f"{float(ascii_number(seconds)):g}"
 
 
 def _of(trial: optuna.Trial, name: str, choices: list[str]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.intervals import LEVEL
 from fogml.models.box import LEAST_SPAN_DEGC, ways_moved
-from fogml.numerals import percent, short
+from fogml.numerals import against, label, percent, short, stated, unit_of
 from fogml.validation.reasons import (
     Grade,
     Reason,
@@ -219,14 +219,14 @@ def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
 
 
 def _limits(judgement: Judgement) -> Iterator[Reason]:
-    stated = [*judgement.limits, *([judgement.design_index] if judgement.design_index else [])]
-    for outcome in stated:
+    for outcome in (*judgement.limits, *([judgement.design_index] if judgement.design_index else [])):
         if not outcome.met:
-            name = outcome.quantity.replace("_", " ")
+            name = label(outcome.quantity)
             yield Reason(
                 "do_not_use",
-                f"{name} over its limit",
-                f"{name.capitalize()} is {short(outcome.value)}, the limit {outcome.limit:g}.",
+                f"{name[:1].lower()}{name[1:]} over its limit",
+                f"{name} is {against(outcome.value, outcome.limit)} {unit_of(outcome.quantity)}, the limit "
+                f"{stated(outcome.limit)}.",
                 "See which regime the rest comes from, train on more runs, or compare other models.",
             )
 

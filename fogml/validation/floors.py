@@ -11,7 +11,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray, IntArray
 from fogml.errors import InputError
 from fogml.intervals import LEVEL
-from fogml.numerals import percent, short
+from fogml.numerals import against, percent, short, stated
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.noise_series import rows_at_rest, sample_interval
 from fogml.runs.run import Run
@@ -181,9 +181,9 @@ def out_of_reach(
     if index >= low:
         return None
     return (
-        f"No model can reach the design index of {index:g} deg/h: the noise alone leaves {short(floor)} "
-        f"deg/h rms ({short(low)} to {short(high)}, {percent(LEVEL, 0)}) in {count} averages over "
-        f"{averaging_s:g} s of {where}"
+        f"No model can reach the design index of {stated(index)} deg/h: the noise alone leaves "
+        f"{against(floor, index)} deg/h rms ({against(low, index)} to {short(high)}, {percent(LEVEL, 0)}) in "
+        f"{count} averages over {averaging_s:g} s of {where}"
     )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import FogmlError, InputError, counted
 from fogml.models.table import usable_rows
-from fogml.numerals import short
+from fogml.numerals import against, stated
 from fogml.runs.exchange import runs_of
 from fogml.runs.run import Run
 from fogml.runs.transitions import transition_mask
@@ -113,8 +113,9 @@ class IndexSearch:
         )
         tries = counted(len(self.trials), "try", "tries")
         return (
-            f"Searched on folds of the training runs in {tries}: {outcome} ({short(self.chosen.rms, 4)} "
-            f"deg/h against {self.design_index:g}). The test runs were judged once."
+            f"Searched on folds of the training runs in {tries}: {outcome} "
+            f"({against(self.chosen.rms, self.design_index)} deg/h against "
+            f"{stated(self.design_index)}). The test runs were judged once."
         )
 
 

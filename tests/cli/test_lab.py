@@ -253,5 +253,6 @@ def test_what_rounding_leaves_is_no_error_and_the_terminal_shows_the_page(tmp_pa
     ways = json.loads((tmp_path / "out" / "north.json").read_text())["ways"]
     assert ways["palindrome"]["greatest_error_deg"] == ways["drift-observing"]["error_deg"] == 0.0
     assert ways["plain"]["error_deg"] > 1e-3 and "e-1" not in told
+    assert "under 10⁻⁹ deg" in (tmp_path / "out" / "north.html").read_text()
     for way in ways.values():
         assert f"{way['rms_se']:.3g}" in told

@@ -115,7 +115,9 @@ def test_verdicts(cycle, limits):
     assert rejected["verdict"] == "rejected"
     assert rejected["reasons"][0] == "Thermal hysteresis of the bias is over its limit"
     assert verdict(threshold=1.0)["verdict"] == "incomplete"
-    assert row(verdict(scale_factor_error={"from": 100}), "scale_factor_error")["met"] is False
+    low = verdict(scale_factor_error={"from": 100})
+    assert row(low, "scale_factor_error")["met"] is False
+    assert low["reasons"] == ["Scale factor error is below its limit"]
 
 
 def test_a_run_of_training_is_no_test(cycle, limits):
@@ -148,9 +150,13 @@ def test_a_gyro_is_named_by_what_is_known_of_it():
 
 
 def test_limits_in_words():
-    assert limit_words({"from": -0.1, "to": 0.1}) == "± 0.1"
-    assert limit_words({"from": None, "to": 5.0}) == "≤ 5" and limit_words({"from": 3.0, "to": None}) == "≥ 3"
-    assert limit_words({"from": -1.0, "to": 2.0}) == "−1 … 2" and limit_words(None) == ""
+    def words(limit, key="bias"):
+        return limit_words({"quantity": key, "limit": limit})
+
+    assert words({"from": -0.1, "to": 0.1}) == "± 0.1"
+    assert words({"from": -0.1, "to": 0.1}, "bias_stability") == "≤ 0.1"
+    assert words({"from": None, "to": 5.0}) == "≤ 5" and words({"from": 3.0, "to": None}) == "≥ 3"
+    assert words({"from": -1.0, "to": 2.0}) == "−1 … 2" and words(None) == ""
 
 
 def test_runs_of_two_units_are_refused(cycle):

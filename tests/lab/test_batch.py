@@ -117,9 +117,16 @@ def test_figures_that_are_bounds_and_limits_that_differ_are_told_as_such(tmp_pat
     assert cells[3:8] == ("≤ 0.0100", "≤ 0.0110", "≤ 0.0150", "≤ 0.0190", "≤ 0.0200")
     assert cells[8] == "they differ"
     assert "≤ 0.0200" in batch_page(values)
+    (bias,) = values["quantities"]
+    bias |= {"limits_differ": False, "limit": {"from": -0.02, "to": 0.02}}
+    bias["distribution"]["largest"] = 0.020001
+    assert distribution_table(values).rows[0].cells[7:9] == ("≤ 0.020001", "± 0.02")
     batch_spreadsheet(values, tmp_path / "batch.xlsx")
     head, first, *_ = openpyxl.load_workbook(tmp_path / "batch.xlsx")["Units"].iter_rows(values_only=True)
     assert first[head.index("told as at most")] == "bias" and "told as at least" not in head
+    sheet = openpyxl.load_workbook(tmp_path / "batch.xlsx")["Distribution"]
+    head, first, *_ = sheet.iter_rows(values_only=True)
+    assert (first[head.index("limit from")], first[head.index("limit to")]) == (-0.02, 0.02)
 
 
 def test_a_unit_twice_and_a_file_of_another_kind_are_refused(folders, tmp_path):

@@ -75,6 +75,21 @@ def test_a_sentence_says_what_the_test_comes_to() -> None:
     assert verdict_sentences(bare) == ["These runs tell no scale factor; the notes say what it needs."]
 
 
+def test_rows_have_the_digits_that_their_errors_allow() -> None:
+    values = told(20.0, 3)
+    line = values["scale_factor"] | {"scale_factor": 1.00022075, "se": 1.6e-7, "ci90": [1.0002205, 1.000221]}
+    sensed = {"temperature": [0, 1, 2, 3], "ppm_per_degC": 10.71847, "se": 0.00014, "ci90": [10.718, 10.719]}
+    sensed["curvature_ppm_per_degC2"] = None
+    slew = {"limited": False, "output_deg_s2": 100022.0, "table_deg_s2": 100000.0}
+    values |= {"scale_factor": line, "temperature_sensitivity": sensed, "slew": slew}
+    rows = {row.quantity: row for row in result_rows(values)}
+    assert rows["scale factor"][1:3] == ("1.00022075", "1.6 × 10⁻⁷")
+    assert rows["scale factor"].remark == "+220.75 ± 0.25 ppm (90 %)"
+    assert rows["temperature sensitivity"][1:3] == ("10.71847", "0.00014")
+    assert rows["temperature sensitivity"].remark == "over 4 temperatures, 90 %: ± 0.00050 ppm/°C"
+    assert rows["slew, at least"].value == "100000"
+
+
 def test_three_rates_tell_none() -> None:
     line = told(0.0, 0, (0.0, 10.0, -10.0, 0.0))["scale_factor"]
     assert line["nonlinearity_ppm"] is None and line["nonlinearity_ci90_ppm"] is None

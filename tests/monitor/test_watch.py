@@ -11,7 +11,7 @@ import pytest
 from fogml.monitor.monitor_json import monitor_json
 from fogml.monitor.watch import watch
 from fogml.report.monitor_page import monitor_page, unit_file, unit_page
-from fogml.report.monitor_words import alarm_words, calibration_words, outlier_words
+from fogml.report.monitor_words import alarm_words, calibration_words, evidence, outlier_words
 from tests.monitor.test_store import RECORD
 
 
@@ -199,6 +199,13 @@ def test_a_clock_that_was_never_set_dates_no_run(began):
 def test_first_runs_are_a_baseline():
     (unit,) = watch(service(3))
     assert unit.state == "baseline"
+    assert "3 runs so far: no change can be told yet, 5 are the least that tell one" in unit.notes
+
+
+def test_evidence_of_none_is_told_as_none_though_its_axis_has_no_zero():
+    drawing = evidence(values_of(watch(service(3)))["units"][0], 1e6)
+    assert "at most 0, against a limit of 1000000" in drawing.alt
+    assert "below 0.01 is drawn there" in drawing.caption
 
 
 def test_units_of_first_runs_alone_are_not_said_to_be_unchanged():

@@ -65,6 +65,12 @@ def test_a_gap_without_a_sure_cause_names_the_likeliest() -> None:
     assert effect(likeliest.effect).title in first
 
 
+def test_a_stage_is_of_what_was_found_only_where_something_is_named() -> None:
+    told = "in which what was found acts"
+    assert told in page("explained").text and told not in page("unknown").text
+    assert "by its looks: no cause is named" in page("unknown").text
+
+
 def test_what_is_suspected_is_told_with_its_probability_and_is_no_name() -> None:
     found = every_diagnosis()["unknown"]
     suspected = replace(every_diagnosis()["explained"].found[0], probability=0.72)

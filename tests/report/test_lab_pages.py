@@ -15,7 +15,7 @@ from fogml.lab.navigation import navigation_costs
 from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.north_schemes import simulated_positions
-from fogml.report.misalignment_page import misalignment_page, slopes_over_tilts
+from fogml.report.misalignment_page import misalignment_page, region_figure, slopes_over_tilts
 from fogml.report.north_page import north_page
 from fogml.report.train_page import train_page
 from tests.report.judgements import judgement
@@ -102,6 +102,15 @@ def test_figures_in_the_text() -> None:
 
 def test_without_standard_errors_the_page_says_so() -> None:
     assert "No confidence region" in misalignment((0.0, 90.0), (50.0,))
+
+
+def test_the_region_of_both_components_lies_within_its_frame() -> None:
+    values = misalignment_values()
+    figure = region_figure(values).figure
+    outline = np.asarray(values["region"]["outline_deg"])
+    for axis, (low, high) in enumerate((figure.layout.xaxis.range, figure.layout.yaxis.range)):
+        free = 0.05 * np.ptp(outline[:, axis])
+        assert low < outline[:, axis].min() - free and high > outline[:, axis].max() + free
 
 
 def test_train_page_without_navigation_has_no_such_part() -> None:

@@ -7,10 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogml.numerals import number
+from fogml.numerals import against, number
+from fogml.report.certificate import certificate
+from fogml.report.train_page import train_page
 from fogml.report.verdict import model_card, own_noise, stated_limits, subject, verdict, worst_run
 from fogml.runs.findings import Finding
+from fogml.validation.advice import advice_on
 from tests.report.judgements import judged_run, judgement
+from tests.report.pages import Page
 
 
 def test_the_lead_states_what_is_left_of_what_the_averaging_and_the_floor() -> None:
@@ -86,6 +90,19 @@ def test_baselines_are_not_called_models(kind: str, words: str) -> None:
 
 def test_subject_names_unit_axis_model_and_runs() -> None:
     assert subject(judgement(2)) == "FOG-0417, axis x: rbf on b.csv and c.csv"
+
+
+def test_a_limit_missed_by_little_is_seen_to_be_missed() -> None:
+    value = judgement().design_index.value
+    judged = judgement(limit=value * (1.0 - 1e-6))
+    for told in (
+        " ".join(verdict(judged)),
+        Page(train_page(judged)).text,
+        Page(certificate(judged)).text,
+    ):
+        shown = against(value, judged.design_index.limit)
+        assert float(shown) > judged.design_index.limit and shown in told
+    assert f"Rms is {shown} deg/h, the limit" in " ".join(advice_on(judged).reasons)
 
 
 def test_stated_limits_begin_with_the_design_index() -> None:

@@ -119,7 +119,7 @@ def test_more_samples_than_a_file_can_hold(tmp_path):
         for name, unit in (("time", "s"), ("gyro", "deg/h")):
             file.create_dataset(name, (1 << 40,), float, chunks=(1 << 10,)).attrs["unit"] = unit
     for read in (read_run, lambda path: next(read_blocks(path))):
-        with pytest.raises(InputError, match=r"run\.h5: damaged: it states 2\.2e\+12 values"):
+        with pytest.raises(InputError, match=r"run\.h5: damaged: it states 2\.2 × 10¹² values"):
             read(path)
 
 

@@ -29,7 +29,7 @@ FAULTS = {
     "reset": ({"time": np.r_[TIME[:50], TIME[:50]]}, "'time', sample 51: time goes back"),
     "repeated": ({"time": with_value(TIME, 49.0)}, "'time', sample 51: time repeats"),
     "single precision": ({"time": (TIME + 1.7e9).astype("f4")}, "single precision .* 128 s apart"),
-    "tiny steps": ({"time": 1e-299 * TIME}, "'time': samples 1e-299 s apart are no gyro's"),
+    "tiny steps": ({"time": 1e-299 * TIME}, "'time': samples 1 × 10⁻²⁹⁹ s apart are no gyro's"),
     "a matrix": ({"gyro": GYRO[:, None]}, r"'gyro': of shape \(100, 1\)"),
     "another length": ({"T": TEMPERATURE[1:]}, "columns differ in length"),
     "text": ({"T": np.full(100, "warm")}, "'T': holds .*numbers were expected"),

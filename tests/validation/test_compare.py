@@ -168,7 +168,7 @@ def test_an_index_is_out_of_reach_only_below_the_least_noise_that_the_floor_allo
     most = 5.0e-3 * np.sqrt(chi2.ppf(0.95, count) / count)
     assert out_of_reach(1.001 * least, [floor], [count], 600.0, "a.csv") is None
     told = out_of_reach(0.999 * least, [floor], [count], 600.0, "a.csv")
-    assert f"leaves 0.003 deg/h rms ({least:.3g} to {most:.3g}, 90 %)" in told
+    assert f"leaves 0.00300 deg/h rms ({least:.3g} to {most:.3g}, 90 %)" in told
 
 
 def test_an_index_below_the_floor_is_said_at_once(runs):

@@ -22,7 +22,7 @@ from fogml.gap.result_parts import Rehearsed
 from fogml.gap.rows import Rows
 from fogml.gap.search import Search
 from fogml.gap.shapes import usual_shapes
-from fogml.numerals import short
+from fogml.numerals import ascii_number
 from fogml.settings_check import check_numbers
 from fogml.signals.bases import corners
 from fogml.twin.effect import NoiseEffect
@@ -94,7 +94,7 @@ def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
         "steps": [f"{soak} {REPEAT.off_h:g} h", {f"{soak} {hours:g} h": ["power on"]}, *course_again],
     }
     if fastest > Programme.fastest_rate:
-        values["fastest_rate"] = f"{short(fastest)} degC/min"
+        values["fastest_rate"] = f"{ascii_number(fastest)} degC/min"
     programme = programme_from(values, "repeat-run")
     total = REPEAT.off_h + hours + float(rows.run.span_s) / 3600.0
     told = (f"{soak} {REPEAT.off_h:g} h, power off", f"{soak} {hours:g} h, power on", *course_again)
@@ -135,7 +135,7 @@ def _steps_again(rows: Rows) -> tuple[list[str], float]:
             continue
         if soaked:
             said.append(f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min")
-        speed = float(short(abs(to - at) / minutes))
+        speed = float(ascii_number(abs(to - at) / minutes))
         fastest = max(fastest, speed)
         said.append(f"ramp to {to:g} degC at {speed:g} degC/min")
         at, soaked = to, 0.0
