@@ -161,7 +161,7 @@ def test_what_is_suspected_is_told_beside_what_was_found(capsys):
     for case in (found, replace(found, suspected=(suspected,))):
         _print(case, Terminal())
         told = " ".join(capsys.readouterr().out.split())
-        said = "Suspected, and not sure enough to be named: moisture or ageing (0.72)"
+        said = "Suspected, and not sure enough to be named: moisture or ageing (72 %)"
         assert (said in told) == bool(case.suspected)
 
 
@@ -269,7 +269,7 @@ def test_runs_of_different_units(runs, tmp_path, invoke, monkeypatch):
     page = (out / "units.html").read_text(encoding="utf-8")
     assert set(re.findall(r'href="([^"]*)"', page)) == {"FOG_1/gap.html", "FOG-2/gap.html"}
     assert "−0.200 … 0.900" in page and "units.html" in said
-    assert "the next unit's lies between -0.2 and 0.9 deg/h" in " ".join(said.split())
+    assert "the next unit's lies between −0.2 and 0.9 deg/h" in " ".join(said.split())
 
 
 def test_no_temperature_that_moves(runs, tmp_path, invoke):
