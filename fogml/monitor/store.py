@@ -22,7 +22,6 @@ from fogml.errors import InputError, install_words
 from fogml.locks import NO_ROOM, sole_writer
 from fogml.monitor.record import NUMBERS, TEXTS, RunRecord
 from fogml.outputs import folder_to_fill, whole_file
-from fogml.readers.stored import LONGEST_MARK
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine, Table
@@ -93,6 +92,8 @@ class FolderStore(Store):
         return self.folder / FILE
 
     def add(self, records: Sequence[RunRecord]) -> int:
+        from fogml.runs.reader_process import LONGEST_MARK
+
         for record in records:
             for name in TEXTS:
                 if len(getattr(record, name)) > LONGEST_MARK:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fogml.arrow_arrays import values_of
-from fogml.readers.stored import LONGEST_MARK, Refused, text_of
+from fogml.readers.stored import Refused, text_of
 
 _BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
 _BATCH_ROWS = 1 << 16
@@ -113,16 +113,16 @@ class ParquetColumn:
                 # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
                 yield values_of(piece.cast("float64", safe=False))
 
-    def marks(self, most: int) -> tuple[list[str], np.ndarray[Any, Any]]:
-        """The different texts of a column, at most so many, and the place of each row's among them."""
+    def marks(self, most: int, longest: int) -> tuple[list[str], np.ndarray[Any, Any]]:
+        """The different texts of a column, at most so many and so long, and each row's place among them."""
         found: dict[str, int] = {}
         codes = np.empty(self.shape[0])
         at = 0
         for piece in self.parts(0, self.shape[0]):
             for value in piece.to_pylist():
                 mark = text_of(value)
-                if len(mark) > LONGEST_MARK:  # cut, two that differ behind it would be one
-                    raise Refused(f"a mark of more than {LONGEST_MARK} characters")
+                if len(mark) > longest:  # cut, two that differ behind it would be one
+                    raise Refused(f"a mark of more than {longest} characters")
                 codes[at] = found.setdefault(mark, len(found))
                 at += 1
             if len(found) > most:

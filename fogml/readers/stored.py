@@ -15,7 +15,6 @@ from fogml.readers.columns import LONGEST_ARRAY, MOST_COLUMNS
 
 _PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
 MOST_NAMES = 10_000
-LONGEST_MARK = 1000  # characters of a text in a column
 DEEPEST = 4  # of groups within groups, as HDF5 makes them of a unit with slashes, too
 
 

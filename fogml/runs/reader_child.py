@@ -104,7 +104,7 @@ def answers(
         if request["do"] == "text":
             parts = [array.text(request["start"], request["stop"])]
         elif request["do"] == "marks":
-            names, codes = array.marks(request["most"])
+            names, codes = array.marks(request["most"], request["longest"])
             parts = [codes]
         else:
             samples = reader("fogml.readers.stored:samples", "numpy")

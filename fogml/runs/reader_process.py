@@ -31,10 +31,12 @@ from fogml.readers.stored import MOST_NAMES
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 
 __all__ = [
-    "CHILD", "DEFAULT_LIMITS", "ReaderProcess", "ReadingLimits", "StoredArray", "StoredFile", "stored_file",
+    "CHILD", "DEFAULT_LIMITS", "LONGEST_MARK", "ReaderProcess", "ReadingLimits", "StoredArray", "StoredFile", "stored_file",
 ]  # fmt: skip
 
 CHILD = Path(__file__).with_name("reader_child.py")
+LONGEST_MARK = 1000
+"""Characters of a text in a column."""
 _LONGEST_ANSWER = 1 << 26
 _PIPE_BYTES = 1 << 20
 """Of samples on their way: the most that Linux lets any user have."""
@@ -100,7 +102,8 @@ class StoredFile:
             If the file is damaged there.
         """
         codes = np.empty(max(array.shape), dtype=np.float64)
-        names = self.ask({"do": "marks", "array": array.index, "most": most}, codes)["names"]
+        request = {"do": "marks", "array": array.index, "most": most, "longest": LONGEST_MARK}
+        names = self.ask(request, codes)["names"]
         return np.array(names, dtype=np.str_)[codes.astype(np.intp)] if len(codes) else np.empty(0, np.str_)
 
     def text(self, array: StoredArray, block: int = 1 << 20) -> Iterator[bytes]:
