@@ -92,7 +92,7 @@ class FolderStore(Store):
         return self.folder / FILE
 
     def add(self, records: Sequence[RunRecord]) -> int:
-        from fogml.runs.reader_process import LONGEST_MARK
+        from fogml.runs.reading_limits import LONGEST_MARK
 
         for record in records:
             for name in TEXTS:

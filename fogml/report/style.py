@@ -206,9 +206,7 @@ _MULTIPLES: tuple[tuple[float, ...], ...] = (
     (1,),
     (1, 2, 5),
     (1, 1.5, 2, 3, 4, 5, 6, 8),
-    (1, 1.2, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 6, 7, 8, 9),
-    tuple(half / 2 for half in range(2, 20)),
-    tuple(fifth / 5 for fifth in range(5, 50)),
+    (1, 1.2, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6, 6.5, 7, 7.5, 8, 8.5, 9, 9.5),
     tuple(tenth / 10 for tenth in range(10, 100)),
 )
 

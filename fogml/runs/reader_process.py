@@ -28,15 +28,13 @@ from numpy.typing import NDArray
 from fogml.errors import InputError, printable
 from fogml.readers import extra_hint, reader_of
 from fogml.readers.stored import MOST_NAMES
-from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
+from fogml.runs.reading_limits import DEFAULT_LIMITS, LONGEST_MARK, ReadingLimits
 
 __all__ = [
-    "CHILD", "DEFAULT_LIMITS", "LONGEST_MARK", "ReaderProcess", "ReadingLimits", "StoredArray", "StoredFile", "stored_file",
+    "CHILD", "DEFAULT_LIMITS", "ReaderProcess", "ReadingLimits", "StoredArray", "StoredFile", "stored_file",
 ]  # fmt: skip
 
 CHILD = Path(__file__).with_name("reader_child.py")
-LONGEST_MARK = 1000
-"""Characters of a text in a column."""
 _LONGEST_ANSWER = 1 << 26
 _PIPE_BYTES = 1 << 20
 """Of samples on their way: the most that Linux lets any user have."""

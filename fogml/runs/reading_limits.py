@@ -8,6 +8,9 @@ from pathlib import Path
 from fogml.errors import InputError
 from fogml.numerals import short
 
+LONGEST_MARK = 1000
+"""Characters of a text in a column."""
+
 
 @dataclass(frozen=True)
 class ReadingLimits:
