@@ -124,9 +124,9 @@ def to_error(value: float, error: float | None, most: int = 4) -> str:
     return f"{value:.{min(decimals, most)}f}".replace("-", "−")
 
 
-def with_error(value: float, se: float) -> str:
+def with_error(value: float, se: float | None) -> str:
     """A value with its standard error, both to the error's second figure; bare where there is none."""
-    if not (math.isfinite(se) and se > 0.0):
+    if se is None or not (math.isfinite(se) and se > 0.0):
         return number(value)
     value = 0.0 if abs(value) < 0.005 * se else value
     places = 1 - math.floor(math.log10(se))
@@ -148,7 +148,7 @@ def in_two(value: float, se: float | None) -> tuple[str, str]:
     >>> in_two(10.718473, 1.36e-4), in_two(0.353, None)
     (('10.71847', '0.00014'), ('0.353', '–'))
     """
-    told, _, error = with_error(value, math.nan if se is None else se).partition(" ± ")
+    told, _, error = with_error(value, se).partition(" ± ")
     return told, error or number(se)
 
 
@@ -166,7 +166,7 @@ def stated(value: float) -> str:
     return _typeset(f"{value:.10g}")
 
 
-def against(value: float, *limits: float | None) -> str:
+def against(value: float | None, *limits: float | None) -> str:
     """A number that stands beside limits: with more digits than `number` where it would seem to lie on one.
 
     Examples
@@ -174,7 +174,7 @@ def against(value: float, *limits: float | None) -> str:
     >>> against(0.7, 0.5), against(0.50004, 0.5), against(0.5, 0.5)
     ('0.700', '0.50004', '0.500')
     """
-    if not math.isfinite(value):
+    if value is None or not math.isfinite(value):
         return number(value)
     for digits in range(3, 17):
         told = float(_in_full(value, digits))
