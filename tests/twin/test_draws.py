@@ -150,6 +150,19 @@ def test_a_plant_is_fitted_to_what_was_recorded():
     assert max(found.misfit_degc.values()) < 0.01  # the sensors' noise is 0.005
 
 
+def test_a_ripple_of_the_air_is_no_slow_wave_in_a_long_run():
+    """One sample in 180 s of a ripple of 181 s would be a wave of nine hours."""
+    true = replace(load_twin("nominal"), plant=Plant(heating=SelfHeating(3.0, 3.0, 900.0)))
+    steps = [*STEPS, "soak at 55 degC for 1600 min"]
+    run = simulate(steps, true, sample_s=20.0, columns=COLUMNS).run
+    ripple = 0.5 * np.sin(2.0 * np.pi * run.time / 181.0)
+    found = fit_plant(true, [run.with_columns(T_chamber=run.columns["T_chamber"] + ripple)])
+    assert found is not None and max(found.misfit_degc.values()) < 0.02
+    for name in ("case", "coil", "electronics"):
+        fitted, known = (getattr(plant.constants, name) for plant in (found.plant, true.plant))
+        assert fitted == pytest.approx(known, rel=0.03), name
+
+
 def test_where_the_prior_says_more_than_the_runs_they_tell_no_plant():
     twin = replace(load_twin("nominal"), plant=Plant(heating=SelfHeating(3.0, 3.0, 900.0)))
     run = simulate(STEPS, twin, sample_s=60.0, columns=COLUMNS).run

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.arrays import BoolArray, FloatArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.runs.run import Run
 from fogml.settings_check import check_numbers
 from fogml.twin.plant.heat import HEATING, PowerWindows
@@ -39,7 +39,7 @@ class FitSettings:
     settling_s
         A run may begin far from rest: so much of it is not fitted to, or a quarter where that is less [s].
     most_rows, fewest_rows
-        Rows of a run: at most one a minute in ten hours, well under any constant.
+        Rows of a run, means of as many samples: at most one a minute in ten hours, well under any constant.
     least_motion_degc
         A run that moves less tells nothing of a plant [degC].
     misfit_degc
@@ -164,19 +164,29 @@ def _recorded(run: Run) -> dict[str, FloatArray]:
 def _course(run: Run, names: Sequence[str], settings: FitSettings) -> _Course | None:
     run = run.without_dropouts
     inputs, powered = inputs_of_run(run)
-    step = max(1, len(run) // settings.most_rows)
     told = _recorded(run) | {AIR: run.columns[AIR]}
-    rows = {name: told[name][::step] for name in (*names, AIR)} | {"turning": inputs.turning_deg_s[::step]}
-    rows |= {"fan": inputs.drives["fan"][::step]} if "fan" in inputs.drives else {}
-    usable = np.all([np.isfinite(values) for values in rows.values()], axis=0)
-    time, read = run.time[::step][usable], {name: values[usable] for name, values in rows.items()}
-    turning, fan = read.pop("turning"), read.pop("fan", None)
+    usable = np.all([np.isfinite(told[name]) for name in (*names, AIR)], axis=0)
+    step = max(1, int(usable.sum()) // settings.most_rows)
+    # Means: of samples that lie so far apart a ripple of the chamber's air would make a slow wave.
+    starts = np.arange(0, int(usable.sum()), step)
+    time = _means(run.time[usable], starts)
+    read = {name: _means(told[name][usable], starts) for name in (*names, AIR)}
+    # What holds until the next mean is one of the samples from this one's middle on.
+    held = np.append(0, starts[1:] + step // 2) if len(starts) > 1 else starts
+    held = np.minimum(held, int(usable.sum()) - 1)
+    turning = _means(inputs.turning_deg_s[usable], held)
+    fan = _means(inputs.drives["fan"][usable], held) if "fan" in inputs.drives else None
     if len(time) < settings.fewest_rows:
         return None
     if max(float(np.ptp(values)) for values in read.values()) < settings.least_motion_degc:
         return None
     skipped = min(settings.settling_s, 0.25 * float(time[-1] - time[0]))
     return _Course(powered, time, read.pop(AIR), fan, turning, read, time - time[0] >= skipped)
+
+
+def _means(values: FloatArray, starts: IndexArray) -> FloatArray:
+    """Means of values from each of some places up to the next."""
+    return np.asarray(np.add.reduceat(values, starts) / np.diff(starts, append=len(values)))
 
 
 def _left(twin: Twin, course: _Course) -> FloatArray:
