@@ -28,10 +28,15 @@ def batch_of(units: Sequence[Mapping[str, Any]], home: Path) -> dict[str, Any] |
     InputError
         If a unit's report was taken away or changed by hand.
     """
+    from fogml.fleet.summary import label_of
     from fogml.lab.batch import batch_json, read_reports
 
-    done = [unit for unit in units if unit["job"] == "acceptance" and unit["status"] == DONE]
-    return batch_json(read_reports([home / unit["folder"] for unit in done]), home) if done else None
+    asked = [unit for unit in units if unit["job"] == "acceptance"]
+    done = [unit for unit in asked if unit["status"] == DONE]
+    if not done:
+        return None
+    lacking = [label_of(unit) for unit in asked if unit["status"] != DONE]
+    return batch_json(read_reports([home / unit["folder"] for unit in done]), home, lacking)
 
 
 def write_batch(batch: Mapping[str, Any], folder: Path, name: str) -> None:

@@ -66,7 +66,9 @@ def _is_row(row: Any) -> bool:
     return all(isinstance(one, int | float | None) for one in figures) and {*_ROW} <= set(row)
 
 
-def batch_json(reports: Sequence[tuple[Path, Mapping[str, Any]]], home: Path | None = None) -> dict[str, Any]:
+def batch_json(
+    reports: Sequence[tuple[Path, Mapping[str, Any]]], home: Path | None = None, lacking: Sequence[str] = ()
+) -> dict[str, Any]:
     """The batch of some acceptance reports.
 
     Parameters
@@ -75,13 +77,16 @@ def batch_json(reports: Sequence[tuple[Path, Mapping[str, Any]]], home: Path | N
         As `read_reports` gives them.
     home
         Folder of the batch's page, from which the units' pages are linked; absolute links if None.
+    lacking
+        Names of units that should have a report and have none.
 
     Returns
     -------
     dict
         Schema ``fogml.batch/1``: ``counts`` of verdicts, ``yield`` with its 90 % interval, ``quantities``
         with distribution of sizes, limit, how many are over it and of how many the figure is an upper or
-        lower bound alone (``at_most``, ``at_least``), ``units`` with those rejected first.
+        lower bound alone (``at_most``, ``at_least``), ``units`` with those rejected first,
+        ``without_report`` units that have none.
     """
     units = [_unit(file, report, home) for file, report in reports]
     units.sort(key=_place)
@@ -98,6 +103,7 @@ def batch_json(reports: Sequence[tuple[Path, Mapping[str, Any]]], home: Path | N
         },
         "quantities": _quantities([report for _, report in reports]),
         "units": units,
+        "without_report": list(lacking),
     }
     return finite_json(values)
 

@@ -231,6 +231,8 @@ def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
     sentences = [first]
     if counts["incomplete"]:
         sentences.append(f"{plural(counts['incomplete'], 'unit')} incomplete: not in the yield.")
+    if lacking := values.get("without_report"):
+        sentences.append(f"Without a report, and not in the yield: {listed(lacking, 8)}.")
     over = [one for one in values["quantities"] if one["over"]]
     if over:
         worst = max(over, key=lambda one: int(one["over"]))

@@ -198,13 +198,11 @@ def direction_of(series: AveragedSeries) -> NDArray[np.int8]:
 def rms_by_regime(judged: RunJudgement) -> Drawing:
     """Rms of the averages in each regime, before and after, with the floor."""
     series = judged.series
-    names = in_order(series.regime.tolist())
-    groups = [("whole run", np.ones(len(series.time), dtype=np.bool_))]
-    groups += [(regime_word(name), series.regime == name) for name in names]
-    rows = []
-    for words, chosen in groups:
-        before, after = (float(np.sqrt(np.mean(v[chosen] ** 2))) for v in (series.before, series.after))
-        rows.append((f"{words} ({percent(float(chosen.mean()))})", before, after))
+    rows = [("whole run (100 %)", *(float(np.sqrt(np.mean(v**2))) for v in (series.before, series.after)))]
+    told = series.by_regime()
+    for name in in_order(list(told)):
+        found = told[name]
+        rows.append((f"{regime_word(name)} ({percent(found['share'])})", found["before"], found["after"]))
     labels = [row[0] for row in rows]
     figure = go.Figure()
     for index, (name, colour, symbol) in enumerate(

@@ -167,7 +167,7 @@ def _summary(writer: Writer, judgement: Judgement) -> None:
         sheet.set_row(row, 32)
         row += 1
     heads = ["test run", "averaging [s]", "rms before [deg/h]", "rms after [deg/h]"]
-    heads += ["bias stability after [deg/h]", "noise floor [deg/h]", "outside training"]
+    heads += ["bias stability after [deg/h]", "noise floor [deg/h]", "outside training [share]"]
     rows = [
         (
             run.run,
@@ -196,7 +196,9 @@ def _summary(writer: Writer, judgement: Judgement) -> None:
     if outcomes:
         limits = [(label(o.quantity), o.limit, o.value, unit_of(o.quantity), o.met) for o in outcomes]
         row = writer.table(sheet, ("limit on", "limit", "reached", "unit", "met"), limits, row) + 1
-    writer.table(sheet, ("model", ""), model_card(judgement.model), row)
+    counts = {"parameters": judgement.model.get("parameters"), "training rows": judgement.model.get("rows")}
+    card = [(name, counts.get(name) or told) for name, told in model_card(judgement.model)]
+    writer.table(sheet, ("model", ""), card, row)
 
 
 def _figures(writer: Writer, judgement: Judgement) -> None:
@@ -212,7 +214,7 @@ def _figures(writer: Writer, judgement: Judgement) -> None:
     heads += [f"{label(field.name).lower()} [{unit_of(field.name)}]" for field in fields(Metrics)]
     heads += [
         "noise floor [deg/h]",
-        "outside training",
+        "outside training [share]",
         "samples used",
         "samples left out",
         "bias relative to",

@@ -94,7 +94,7 @@ _UNIT_COLUMNS = {
     "before": "rms before [deg/h]",
     "after": "rms after [deg/h]",
     "floor": "noise floor [deg/h]",
-    "outside_training": "outside training",
+    "outside_training": "outside training [share]",
     "met": "limits met",
     **{key: key for key in ("verdict", "reason", "folder")},
 }

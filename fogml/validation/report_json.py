@@ -78,6 +78,7 @@ def _run(judged: RunJudgement) -> dict[str, Any]:
         "outside_training": judged.outside_training,
         "not_settled": judged.not_settled,
         "coverage": judged.coverage,
+        "rms_by_regime": judged.series.by_regime(),
         "rows_used": judged.rows_used,
         "rows_left_out": judged.rows_left_out,
         "bias_reference": judged.bias_reference,

@@ -95,6 +95,15 @@ class AveragedSeries:
     regime: NDArray[np.str_]
     flag: NDArray[np.int8]
 
+    def by_regime(self) -> dict[str, dict[str, float]]:
+        """By regime its share of the averages, and their rms about the reference before and after [deg/h]."""
+        told = {}
+        for name in dict.fromkeys(self.regime.tolist()):
+            chosen = self.regime == name
+            before, after = (float(np.sqrt(np.mean(v[chosen] ** 2))) for v in (self.before, self.after))
+            told[name] = {"share": float(chosen.mean()), "before": before, "after": after}
+        return told
+
 
 @dataclass(frozen=True)
 class SoakBias:

@@ -60,6 +60,7 @@ def test_the_batch_holds_every_unit_with_its_page(fleet: Path) -> None:
     out = fleet / "out"
     batch = json.loads((out / "batch.json").read_text())
     assert {unit["serial_number"] for unit in batch["units"]} == set(UNITS)
+    assert batch["without_report"] == ["FOG-4 x"] and "FOG-4 x" in (out / "batch.html").read_text()
     found = {unit["serial_number"]: unit for unit in batch["units"]}
     for page in ("batch.html", "fleet.html"):
         links = re.findall(r'<a href="([^"]+)"', (out / page).read_text())

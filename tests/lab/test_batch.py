@@ -15,7 +15,7 @@ from fogml.errors import InputError
 from fogml.lab.acceptance_rows import QUANTITIES
 from fogml.lab.batch import batch_json, read_reports
 from fogml.numerals import in_order_of_serial
-from fogml.report.acceptance_page import batch_page, distribution_table
+from fogml.report.acceptance_page import batch_page, distribution_table, verdict_sentences
 from fogml.report.spreadsheets import batch_spreadsheet
 
 SERIAL = "FOG-70-A-2026-BATCH-17-OF-THE-SECOND-LINE-{:04d}"
@@ -127,6 +127,14 @@ def test_figures_that_are_bounds_and_limits_that_differ_are_told_as_such(tmp_pat
     sheet = openpyxl.load_workbook(tmp_path / "batch.xlsx")["Distribution"]
     head, first, *_ = sheet.iter_rows(values_only=True)
     assert (first[head.index("limit from")], first[head.index("limit to")]) == (-0.02, 0.02)
+
+
+def test_units_without_a_report_are_told_and_not_in_the_yield():
+    reports = [(Path("1.json"), report(1, 0.01))]
+    values = batch_json(reports, lacking=["FOG-9 z"])
+    assert values["without_report"] == ["FOG-9 z"] and values["yield"]["judged"] == 1
+    assert "Without a report, and not in the yield: FOG-9 z." in verdict_sentences(values)
+    assert not any("Without a report" in told for told in verdict_sentences(batch_json(reports)))
 
 
 def test_a_unit_twice_and_a_file_of_another_kind_are_refused(folders, tmp_path):

@@ -44,6 +44,15 @@ def test_keys(judgement):
     assert values["limits"][0]["met"] is False
 
 
+def test_what_is_left_by_regime_adds_up_to_what_is_left(judgement):
+    (run,) = judgement_json(judgement)["test"]
+    parts = run["rms_by_regime"].values()
+    assert sum(part["share"] for part in parts) == pytest.approx(1.0)
+    for when in ("before", "after"):
+        squares = sum(part["share"] * part[when] ** 2 for part in parts)
+        assert squares == pytest.approx(run[when]["rms"] ** 2)
+
+
 def test_no_design_index_no_key(judgement):
     from dataclasses import replace
 
