@@ -198,8 +198,8 @@ def direction_of(series: AveragedSeries) -> NDArray[np.int8]:
 def rms_by_regime(judged: RunJudgement) -> Drawing:
     """Rms of the averages in each regime, before and after, with the floor."""
     series = judged.series
-    rows = [("whole run (100 %)", *(float(np.sqrt(np.mean(v**2))) for v in (series.before, series.after)))]
-    told = series.by_regime()
+    before, after = (float(np.sqrt(np.mean(v**2))) for v in (series.before, series.after))
+    rows, told = [("whole run (100 %)", before, after)], series.by_regime()
     for name in in_order(list(told)):
         found = told[name]
         rows.append((f"{regime_word(name)} ({percent(found['share'])})", found["before"], found["after"]))
