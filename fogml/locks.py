@@ -79,11 +79,16 @@ class FileLock:
         assert self._held is not None
         return os.pread(self._held, 4096, 0).decode("utf-8", "replace")
 
-    def write(self, text: str) -> None:
-        """Write into the file of a lock that is held."""
+    def sign(self) -> None:
+        """Write into the file of a lock that is held which process holds it."""
         assert self._held is not None
         os.ftruncate(self._held, 0)
-        os.pwrite(self._held, text.encode(), 0)
+        os.pwrite(self._held, this_process().encode(), 0)
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether nobody else holds it: by the system, or as the process that signed it last has ended."""
+        return self.sure or has_ended(self.read())
 
     def _is_file_of(self, handle: int) -> bool:
         try:
@@ -165,8 +170,10 @@ def sole_writer(path: str | Path) -> Iterator[None]:
             raise Held(
                 path, f"process {owner['pid']} on {owner['host']}" if owner else "another process", lock.path
             )
-        pid = os.getpid()
-        lock.write(json.dumps({"pid": pid, "host": socket.gethostname(), "started": process_start(pid)}))
+        try:
+            lock.sign()
+        except OSError as error:  # of a full disk, without a name
+            raise unwritable(path, error) from error
         yield
     finally:
         lock.remove()
@@ -180,7 +187,7 @@ def remove_left_locks(home: Path, names: Iterable[str]) -> None:
             continue
         lock = FileLock(home / name)
         with suppress(OSError):
-            if lock.acquire(wait=False) and lock.sure:
+            if lock.acquire(wait=False) and lock.is_ours:
                 # Whoever waits for it sees that its file is gone, and makes another.
                 lock.remove()
             lock.release()
@@ -212,6 +219,18 @@ def _owner(told: str) -> dict[str, Any]:
         return {"pid": int(values["pid"]), "host": str(values["host"]), "started": started}
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         return {}
+
+
+def this_process() -> str:
+    """What a lock's file says of the process that holds it."""
+    pid = os.getpid()
+    return json.dumps({"pid": pid, "host": socket.gethostname(), "started": process_start(pid)})
+
+
+def has_ended(told: str) -> bool:
+    """Whether a lock's file names a process of this host that has ended."""
+    owner = _owner(told)
+    return bool(owner) and not _may_live(owner)
 
 
 def _may_live(owner: dict[str, Any]) -> bool:

@@ -1,9 +1,9 @@
 """Outputs that appear whole or not at all: written beside, then renamed.
 
-What is being written lies in a folder ``.partial-HOST-TOKEN``, locked by its process. Where several
-entries have to be renamed one by one it is first renamed itself, to ``.commit-HOST-TOKEN``: from
-then on the next writer in the same place, should this one be killed, moves in what is left. What a
-dead process of this host left otherwise, the next writer removes, locks of outputs with it.
+What is being written lies in a folder ``.partial-HOST-TOKEN``, locked by its process, which it names for
+file systems without locks. Where several entries have to be renamed one by one it is first renamed itself,
+to ``.commit-HOST-TOKEN``: from then on the next writer in the same place, should this one be killed, moves in
+what is left. What a dead process of this host left otherwise, the next writer removes, locks of outputs too.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ def settle(home: str | Path) -> None:
         except OSError:
             continue  # another settles it
         try:
-            if staging.lock.sure:
+            if staging.lock.is_ours:
                 # Without content it was killed at the end, when all was in its place.
                 if staging.is_committed and staging.content.is_dir():
                     staging.move_in(home)
@@ -239,6 +239,7 @@ class _Staging:
         try:
             if not self.lock.acquire(wait=False):
                 return False
+            self.lock.sign()
             self.content.mkdir()
         except FileNotFoundError:
             return False

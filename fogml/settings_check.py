@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import fields
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 from fogml.errors import InputError
@@ -72,6 +72,24 @@ def check_numbers(
                 f"{count or 'some'} {whole}numbers {words} are" if several else f"a {whole}number {words} is"
             )
             raise InputError(f"{type(settings).__name__}: '{entry.name}' is {given!r}; {asked} needed")
+
+
+def check_whole(name: str, value: object, least: int = 0, most: int | None = None) -> None:
+    """Refuse what is no whole number within bounds, as of a seed or a count; NumPy's integers are some.
+
+    Raises
+    ------
+    InputError
+        Naming it, what it is and what is needed.
+    """
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
+        wanted = f"of {least} or above" if most is None else f"from {least} to {most}"
+        raise InputError(f"'{name}' is {value!r}; a whole number {wanted} is needed")
+
+
+GREATEST_SEED = (1 << 32) - 1
+"""Of models and commands: scikit-learn's generators take no greater one."""
 
 
 def _number(value: object) -> bool:

@@ -157,13 +157,14 @@ class _Static(_Handler):
 class _State(_Handler):
     def get(self) -> None:
         app = self.app
+        files = app.files_told()
         values = {
             "folder": str(app.home),
             "upload_bytes": app.limits.upload_bytes,
             "version": fogml.__version__,
-            "files": app.files_told(),
+            "files": files,
             "jobs": [app.jobs.told(name) for name in reversed(app.jobs.names())],
-            "offered": {takes: app.offered(takes) for takes in OFFERED},
+            "offered": {takes: app.offered(takes, files) for takes in OFFERED},
         }
         if self.get_query_argument("forms", None) is not None:
             values["forms"] = app.forms
@@ -224,7 +225,10 @@ class _Upload(_Handler):
             return
         assert isinstance(self.request.connection, HTTP1Connection)
         self.request.connection.set_max_body_size(self.app.limits.upload_bytes)
-        if int(self.request.headers.get("Content-Length", 0)) > self.app.limits.upload_bytes:
+        length = self.request.headers.get("Content-Length", "0")
+        if not (length.isascii() and length.isdecimal()):
+            raise HTTPError(400, "the length of the file is no number")
+        if int(length) > self.app.limits.upload_bytes:
             raise HTTPError(413, f"the file is larger than {self.app.limits.upload_bytes / 1e6:g} MB allowed")
         try:
             self.app.files.place(self.path_args[0])

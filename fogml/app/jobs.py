@@ -114,6 +114,7 @@ class Jobs:
         self.home, self.at_once = home, at_once
         self.folder = home / "jobs"
         self.folder.mkdir(exist_ok=True)
+        self._written: dict[tuple[str, int, int, str], list[str]] = {}
 
     def names(self) -> list[str]:
         """Numbers of the jobs, in the order in which they were asked for."""
@@ -204,9 +205,20 @@ class Jobs:
         }
 
     def written(self, pattern: str) -> list[str]:
-        """Paths from the app's folder of what jobs have written by a pattern of names, newest first."""
-        homes = [self.folder / name / "results" for name in reversed(self.names())]
-        return [str(path.relative_to(self.home)) for home in homes for path in sorted(home.glob(pattern))]
+        """Paths from the app's folder of what jobs that have ended wrote by a pattern of names, newest first.
+
+        Looked for once: pages ask each second, and a fleet's results are thousands of folders.
+        """
+        ended = {name: self.state(name) not in ("waiting", "running") for name in self.names()}
+        found = []
+        for name in reversed([name for name, has in ended.items() if has]):
+            job = (self.folder / name / "job.json").stat()
+            key = name, job.st_ino, job.st_mtime_ns, pattern
+            if key not in self._written:
+                paths = sorted((self.folder / name / "results").glob(pattern))
+                self._written[key] = [str(path.relative_to(self.home)) for path in paths]
+            found += self._written[key]
+        return found
 
     def runs(self) -> list[dict[str, Any]]:
         """Runs that were imported, as `fogml.app.state.Files.told` tells of files."""

@@ -42,10 +42,6 @@ class Files:
             for p in sorted(found, key=lambda p: p.name)
         ]
 
-    def paths(self, runs: bool) -> list[str]:
-        """Paths from the app's folder: of runs, or of the other files."""
-        return [one["path"] for one in self.told() if one["run"] is runs]
-
     def place(self, name: str) -> Path:
         """Where a file of a name lies.
 
@@ -162,22 +158,23 @@ class App:
         """Files that were dropped, and runs that were imported."""
         return [*self.files.told(), *self.jobs.runs()]
 
-    def offered(self, takes: str) -> list[str]:
-        """Paths that an input of a kind may name."""
-        others = self.files.paths(runs=False)
+    def offered(self, takes: str, files: Sequence[Mapping[str, Any]] | None = None) -> list[str]:
+        """Paths that an input of a kind may name; `files` are those of `files_told`, where they are known."""
+        files = self.files_told() if files is None else files
+        others = [one["path"] for one in files if not one["run"]]
         match takes:
             case "run":
-                return [one["path"] for one in self.files_told() if one["run"]]
+                return [one["path"] for one in files if one["run"]]
             case "model":
                 return _folders(self.jobs.written("**/model/model.json"))
             case "models":
-                return [*self.offered("model"), *_folders(self.offered("fleet"))]
+                return [*self.offered("model", files), *_folders(self.offered("fleet", files))]
             case "fleet":
                 return self.jobs.written("fleet.json")
             case "twin":
                 return [*self.jobs.written("twin.yaml"), *others]
             case "manifest":
-                return [*others, *self.files.paths(runs=True)]
+                return [*others, *(one["path"] for one in files if one["run"] and "/" not in one["name"])]
             case _:
                 return others
 

@@ -37,6 +37,7 @@ from fogml.runs.reading import read_run
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 from fogml.runs.writing import write_run
+from fogml.settings_check import check_whole
 from fogml.signals.averages import block_averages
 
 
@@ -167,6 +168,9 @@ def make_round(
     InputError
         If a number is not possible, or the folder holds a round.
     """
+    for number, name in ((drift, "drift"), (diagnosis, "diagnosis"), (seed, "seed")):
+        check_whole(name, number)
+    check_whole("workers", workers, 1)
     if drift < (not real) or diagnosis < 1:
         raise InputError("a round needs a case of each track at least: --drift, --diagnosis, --real")
     _check_free(Path(directory))

@@ -25,6 +25,7 @@ from fogml.blind.truth import read_truth
 from fogml.errors import InputError
 from fogml.models.baselines import MeanModel
 from fogml.runs.reading import read_run
+from fogml.settings_check import check_whole
 from fogml.validation.floors import floor_of_run
 from fogml.validation.metrics import RunMetrics
 from fogml.validation.run_errors import RunErrors, run_errors
@@ -214,6 +215,7 @@ def score_round(directory: str | Path, entries: Sequence[str] = (), *, workers: 
     InputError
         If there is nothing to score, what was kept was changed, or an answer is missing or not finite.
     """
+    check_whole("workers", workers, 1)
     home = Path(directory)
     told = read_round(home)
     check_kept(home, told)

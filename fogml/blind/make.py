@@ -32,6 +32,7 @@ from fogml.processes import in_processes, one_thread
 from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
+from fogml.settings_check import check_whole
 
 _MOST_UNITS = 300
 """Units that are tried for one case; the hardest effects are shown by one in five."""
@@ -217,10 +218,9 @@ def make_cases(
     InputError
         If an argument is not possible, or `directory` holds cases of another seed or interval.
     """
-    if count < 1 or workers < 1 or first < 1:
-        raise InputError(
-            f"count, workers and the first number must be at least 1, found {count}, {workers} and {first}"
-        )
+    for name, number in (("count", count), ("workers", workers), ("first", first)):
+        check_whole(name, number, 1)
+    check_whole("seed", seed)
     if not 0.1 <= sample_s <= 30.0:
         raise InputError(f"sample interval {sample_s:g} s: 0.1 to 30 s are possible")
     wanted = plans(first - 1 + count, seed, kinds, least_d_prime, of, d_prime)[first - 1 :]

@@ -31,6 +31,7 @@ from fogml.json_files import write_json
 from fogml.outputs import folder_to_fill, settled, whole_folder
 from fogml.processes import in_processes
 from fogml.runs.sources import sources_stamp
+from fogml.settings_check import check_numbers
 
 _FILES = "files"
 LIMIT_S = 600.0
@@ -94,8 +95,7 @@ class RunPlan:
             raise InputError(f"shard {i}/{n}: write i/n with i from 1 to n")
         if self.name is not None and (self.name in ("", "..") or Path(self.name).name != self.name):
             raise InputError(f"--name {self.name}: the name of a folder was expected, no path")
-        if self.workers < 1 or self.threads < 1 or not self.limit_s > 0:
-            raise InputError("workers, threads and the time limit must be positive")
+        check_numbers(self, may_be_0=("seed",))
 
     @property
     def afresh(self) -> bool:

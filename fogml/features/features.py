@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,7 @@ from fogml.features.slices import SavedSlices, Slices
 from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
 from fogml.features.transformer import Transformer
 from fogml.runs.dropouts import RULE, DropoutRule
+from fogml.runs.exchange import one_run, runs_of
 from fogml.runs.run import Run
 from fogml.runs.thermometers import SavedLimits, rule_of
 
@@ -145,8 +146,7 @@ class Features(Transformer):
         InputError
             If a run lacks a temperature, or no row has a full window.
         """
-        group = [runs] if isinstance(runs, Run) else runs
-        return self.learn([self.atom_values(run)[:2] for run in group])
+        return self.learn([self.atom_values(run)[:2] for run in runs_of(runs)])
 
     def learn(self, parts: Sequence[tuple[FloatArray, BoolArray]]) -> Self:
         """As `fit`, from the runs' atom values (n, a) and where they are full (n,)."""
@@ -273,8 +273,8 @@ class Features(Transformer):
             limited, _ = reaching_box(box, self._terms, self._atoms).limit(values, heeded)
         return limited, outside
 
-    def transform(self, run: Run, *, limited: bool = False, linear: bool = False) -> FloatArray:
-        """Feature columns of a run, shape (n, k).
+    def transform(self, run: Run, *, limited: bool = False, linear: bool = False) -> Any:
+        """Feature columns of a run, shape (n, k); a frame of them where `set_output` asks for one.
 
         Parameters
         ----------
@@ -285,21 +285,22 @@ class Features(Transformer):
         linear
             If so, as for a model that goes on linearly.
         """
-        check_holds(run, self.sensors, self._text)
+        check_holds(one_run(run), self.sensors, self._text)
         run = run.read_by(self.thermometer)
         if limited or unmeasured_rows(self._atoms, run) is not None:
             values, full, _ = self.atom_values(run)
-            return self.compose(self.limit(values, full, linear=linear)[0] if limited else values)
+            held = self.limit(values, full, linear=linear)[0] if limited else values
+            return self._contained(self.compose(held))
         columns = np.empty((len(run), len(self)), order="F")
         terms = list(columns.T)
         atoms = atom_columns(self._plan, terms, len(self._atoms))
         evaluate(self._atoms, run, None, atoms)
         compose(self._plan, atoms, terms)
-        return columns
+        return self._contained(columns)
 
-    def fit_transform(self, run: Run, y: object = None) -> FloatArray:
-        """`fit` to one run, then its feature columns, shape (n, k)."""
-        return self.fit(run).transform(run)
+    def fit_transform(self, run: Run, y: object = None) -> Any:
+        """`fit` to one run, then what `transform` makes of it."""
+        return self.fit(one_run(run)).transform(run)
 
     def stream(
         self,

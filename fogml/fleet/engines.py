@@ -13,6 +13,7 @@ from fogml.fleet.tasks import Task, finished, lost, run_task
 from fogml.folders import nearest_folder
 from fogml.outputs import settle
 from fogml.processes import one_thread, worker_pool
+from fogml.settings_check import check_whole
 
 Outcome = dict[str, Any]
 Progress = Callable[[Outcome], None]
@@ -47,8 +48,7 @@ def run_tasks(
     InputError
         If the cluster does not answer, or the disk is full; finished units are kept.
     """
-    if workers < 1:
-        raise InputError(f"workers {workers}: at least 1 is needed")
+    check_whole("workers", workers, 1)
     told = progress or (lambda outcome: None)
     outcomes: dict[str, Outcome] = {}
 

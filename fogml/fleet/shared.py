@@ -152,9 +152,9 @@ class SharedModel(MixedEffectsModel):
         self.own = dict(own or {})
         self.noise = dict(noise or {})
 
-    def fit(self, runs: Run | Sequence[Run]) -> Self:
+    def fit(self, runs: Run | Sequence[Run], y: None = None) -> Self:
         """Fit to training runs, as `FeatureModel.fit`."""
-        super().fit(runs)
+        super().fit(runs, y)
         if self._alone:
             return self
         self.regressor_.covariance_ = self._covariance

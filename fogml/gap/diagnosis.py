@@ -38,6 +38,7 @@ from fogml.processes import one_thread
 from fogml.runs.exchange import one_run, runs_of
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
+from fogml.settings_check import check_whole
 from fogml.twin.registry import effects
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import as_twin
@@ -123,6 +124,7 @@ def diagnose(
         unknown, or no run can be used.
     """
     tell = progress or (lambda what: None)
+    check_whole("seed", seed)
     check_cost(cost_of_false_name)
     fit, held_out, noise = runs_of(fit), runs_of(held_out), None if noise is None else one_run(noise)
     found = inferred(model, fit, held_out, noise, without, priors, tell)

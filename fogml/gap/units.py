@@ -27,6 +27,7 @@ from fogml.gap.search import Explanation
 from fogml.gap.settings import Priors
 from fogml.numerals import probability_words, short, with_error
 from fogml.runs.run import Run
+from fogml.settings_check import check_whole
 from fogml.signals.restricted import next_value, random_effects
 from fogml.twin.twin import Twin
 
@@ -121,6 +122,7 @@ def diagnose_units(
         progress or (lambda what: None),
         (without,) if isinstance(without, str) else tuple(without),
     )
+    check_whole("seed", seed)
     check_cost(cost_of_false_name)
     units = _by_unit(fit)
     held, static = _by_unit(held_out), _by_unit(noise)

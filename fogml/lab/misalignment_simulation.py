@@ -13,6 +13,7 @@ from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_segments import Rows
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES
 from fogml.runs.facts import EARTH_RATE_DEG_H
+from fogml.settings_check import check_whole
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,7 @@ def measurements(
     output_unit: str = "V",
 ) -> TableMeasurements:
     """Turns of all states, tilts and rates, with noise of each turn and of each tilt setting."""
+    check_whole("seed", seed)
     random = np.random.default_rng(seed)
     state, tilt, rate = (
         v.ravel() for v in np.meshgrid(np.array(STATES, dtype=float), tilts_deg, rates_deg_s, indexing="ij")
@@ -131,6 +133,7 @@ def samples(
     rows, time
         As a recorded file holds them; time [s], shape (n,).
     """
+    check_whole("seed", seed)
     random = np.random.default_rng(seed)
     blocks = [_sequence_rates(abs(r), rest_s, turn_s, acceleration_deg_s2, sample_s) for r in rates_deg_s]
     one_tilt = np.concatenate(blocks)

@@ -12,6 +12,7 @@ from fogml.errors import InputError
 from fogml.lab.north import SENSES, Drift, Scheme, drift_error, horizontal_rate
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
+from fogml.settings_check import check_whole
 
 Disturbance = Callable[[FloatArray, FloatArray], FloatArray]
 """Means [deg/h] of drift and noise over spans of time from power-on, shape (m,) to (..., m)."""
@@ -201,6 +202,7 @@ def simulated_positions(
     InputError
         If a stay is shorter than a sample, or the latitude is not accepted.
     """
+    check_whole("seed", seed)
     if not (np.isfinite(sample_s) and 0.0 < sample_s <= scheme.dwell_s):
         raise InputError(f"sample interval {sample_s:g} s: above 0 and no longer than the dwell is needed")
     begin, end = scheme.spans_s

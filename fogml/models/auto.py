@@ -64,7 +64,7 @@ class AutoModel(DriftModel):
         self.seed = seed
         self.progress = progress
 
-    def fit(self, runs: Run | Sequence[Run]) -> Self:
+    def fit(self, runs: Run | Sequence[Run], y: None = None) -> Self:
         """Score the candidates on folds of the training runs, and fit the one chosen to all of them.
 
         Raises
@@ -72,7 +72,7 @@ class AutoModel(DriftModel):
         InputError
             If the runs don't belong together, lack a temperature, or are too short.
         """
-        group = checked_runs(runs)
+        group = checked_runs(runs, y)
         features = None if self.features is None else resolve_features(self.features, group).text
         trial = Trial(group, self.seed, features)
         scores = []

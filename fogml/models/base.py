@@ -16,11 +16,11 @@ from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.intervals import LEVEL
-from fogml.models.card import TrainingCard, check_unit_and_axis
+from fogml.models.card import TrainingCard, check_unit_and_axis, refuse_targets
 from fogml.models.compact import Compact
 from fogml.models.intervals import Intervals
 from fogml.models.scikit_learn import BaseEstimator, NotFittedError
-from fogml.runs.exchange import one_run
+from fogml.runs.exchange import one_run, runs_of
 from fogml.runs.plausible import refuse_twice
 from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
@@ -138,8 +138,8 @@ class DriftModel(BaseEstimator, ABC):
     features_: Features | None = None
 
     @abstractmethod
-    def fit(self, runs: Run | Sequence[Run]) -> Self:
-        """Fit to training runs of one unit and axis.
+    def fit(self, runs: Run | Sequence[Run], y: None = None) -> Self:
+        """Fit to training runs of one unit and axis; `y` is None, there for scikit-learn's pipelines.
 
         Raises
         ------
@@ -260,7 +260,7 @@ class DriftModel(BaseEstimator, ABC):
         self.check_applies(run, any_unit)
         return compensation_of(run, self.evaluate(run))
 
-    def score(self, runs: Run | Sequence[Run], averaging_s: float = 100.0) -> float:
+    def score(self, runs: Run | Sequence[Run], y: None = None, *, averaging_s: float = 100.0) -> float:
         """R² of the drift on averages: the share of the error's variance that the model tells; 1 is all.
 
         The error's mean is part of what is to be told, so that another offset lowers it. Greater is better,
@@ -270,6 +270,8 @@ class DriftModel(BaseEstimator, ABC):
         ----------
         runs
             Runs the model was not fitted to.
+        y
+            None, as of `fit`.
         averaging_s
             Length of the averages [s].
 
@@ -279,7 +281,8 @@ class DriftModel(BaseEstimator, ABC):
             If a run lacks what the model needs, or no run fills one average.
         """
         pairs = []
-        for run in [runs] if isinstance(runs, Run) else runs:
+        refuse_targets(y)
+        for run in runs_of(runs):
             means = block_averages(run.time, run.error_deg_h, self.predict(run), window_s=averaging_s)
             pairs.append(np.array(means.values))
         error, drift = np.concatenate(pairs, axis=1) if pairs else np.empty((2, 0))

@@ -30,15 +30,15 @@ class _ConstantModel(DriftModel):
 
     bias_: float
 
-    def fit(self, runs: Run | Sequence[Run]) -> Self:
+    def fit(self, runs: Run | Sequence[Run], y: None = None) -> Self:
         """Fit to training runs."""
-        group = checked_runs(runs)
+        group = checked_runs(runs, y)
         hashes = hash_ahead(group)
         rows = []
         for run in group:
             used, notes = usable_rows(run, np.ones(len(run), dtype=bool))
-            y = run.error_deg_h[used]
-            rows.append(RunRows(np.empty((len(y), 0)), y, run.time[used], notes))
+            errors = run.error_deg_h[used]
+            rows.append(RunRows(np.empty((len(errors), 0)), errors, run.time[used], notes))
         count = row_count(rows)
         self.bias_ = self._bias(np.concatenate([part.y for part in rows]))
         self.card_ = training_card(

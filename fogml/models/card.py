@@ -135,7 +135,13 @@ def hash_ahead(runs: Sequence[Run]) -> Callable[[], list[str]]:
     return lambda: [hash_of.result() for hash_of in pending]
 
 
-def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
+def refuse_targets(y: object) -> None:
+    """Hold that nothing is given beside runs to learn or to be compared with, as scikit-learn's `y`."""
+    if y is not None:
+        raise InputError("y: the output that a drift model learns is the runs' own; give runs alone")
+
+
+def checked_runs(runs: Run | Sequence[Run], y: object = None) -> tuple[Run, ...]:
     """Training runs as a tuple, of one unit and axis, and either all or none with known Earth rate.
 
     They come in an order by what they hold, so that the order in which they are given decides no model.
@@ -143,8 +149,10 @@ def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
     Raises
     ------
     InputError
-        If there is none, one is empty or there twice, or they don't belong together.
+        If there is none, one is empty or there twice, or they don't belong together, or beside them a `y` is
+        given.
     """
+    refuse_targets(y)
     group = runs_of(runs)
     if not group:
         raise InputError("no training run is given; name at least one")

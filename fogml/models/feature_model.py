@@ -102,7 +102,7 @@ class FeatureModel(DriftModel):
         self.kind = kind
         self.max_rows = max_rows
 
-    def fit(self, runs: Run | Sequence[Run]) -> Self:
+    def fit(self, runs: Run | Sequence[Run], y: None = None) -> Self:
         """Fit to training runs.
 
         Raises
@@ -110,7 +110,7 @@ class FeatureModel(DriftModel):
         InputError
             If the runs don't belong together, lack a temperature, or are too short.
         """
-        group = checked_runs(runs)
+        group = checked_runs(runs, y)
         hashes = hash_ahead(group)
         features = self._chosen_features(group)
         rows = [run_rows(run, features) for run in group]

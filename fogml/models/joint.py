@@ -107,7 +107,7 @@ class JointModel(DriftModel):
         """``joint`` or ``joint-patent``."""
         return "joint-patent" if self.patent else "joint"
 
-    def fit(self, runs: Run | Sequence[Run]) -> Self:
+    def fit(self, runs: Run | Sequence[Run], y: None = None) -> Self:
         """Fit to training runs with turns.
 
         Raises
@@ -119,7 +119,7 @@ class JointModel(DriftModel):
             raise InputError(f"joint: the rate's window is {self.rate_window_s:g} s; it must be positive")
         if self.patent and self.product:
             raise InputError("joint-patent: the patent's form has six columns and none of T*dT; use joint")
-        group = checked_runs(runs)
+        group = checked_runs(runs, y)
         if len({run.gyro_unit for run in group}) > 1:
             raise InputError(
                 "joint: the training runs' outputs are partly in counts and partly in deg/h, "

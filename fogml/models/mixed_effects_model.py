@@ -78,10 +78,10 @@ class MixedEffectsModel(FeatureModel):
         self.kind = kind
         self.max_rows = None
 
-    def fit(self, runs: Run | Sequence[Run]) -> Self:
+    def fit(self, runs: Run | Sequence[Run], y: None = None) -> Self:
         """As `FeatureModel.fit`, with one thread of BLAS: products of some hundred rows."""
         with one_thread("blas"):
-            return super().fit(runs)
+            return super().fit(runs, y)
 
     def _chosen_features(self, runs: Sequence[Run]) -> Features:
         temperatures = [run.temperature("T") for run in runs]

@@ -8,6 +8,7 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from fogml.errors import InputError, known_are
+from fogml.settings_check import GREATEST_SEED, check_whole
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -85,6 +86,7 @@ def make_model(
     from fogml.models.regressors import own_regressor, own_regressors
     from fogml.models.scikit_learn import clone
 
+    check_whole("seed", seed, 0, GREATEST_SEED)
     if name in own_regressors():
         own = own_regressor(name)
         with asked(own, "can't be made and cloned"):

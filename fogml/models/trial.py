@@ -28,6 +28,7 @@ from fogml.models.regressors import (
 from fogml.models.table import RunRows, TrainingTable, averaging_of, recorded_s, row_count, run_rows
 from fogml.models.weights import shift_share
 from fogml.runs.run import Run
+from fogml.settings_check import GREATEST_SEED, check_whole
 from fogml.signals.averages import block_averages
 
 SCORED_ROWS = 2500
@@ -64,6 +65,7 @@ class Trial:
     """
 
     def __init__(self, runs: Sequence[Run], seed: int, features: str | None = None) -> None:
+        check_whole("seed", seed, 0, GREATEST_SEED)
         self.seed = seed
         temperature, rate = _temperatures_and_rates(runs)
         self.rates = distinct_rates(rate, temperature)

@@ -39,9 +39,7 @@ class Exchange(Pictured):
         """Hold that facts and the output's unit are such."""
         if self.gyro_unit not in ("deg/h", "count"):
             raise InputError(f"{self.name}: gyro_unit is '{self.gyro_unit}'; it may be deg/h or count")
-        if not isinstance(self.facts, Facts):
-            kind = type(self.facts).__name__
-            raise InputError(f"{self.name}: facts are {kind}; fogml.Facts(unit=..., axis=...) was expected")
+        checked_facts(self.name, self.facts)
 
     @classmethod
     def from_pandas(cls, frame: pd.DataFrame, name: str = "run", facts: Facts | None = None) -> Self:
@@ -87,7 +85,7 @@ class Exchange(Pictured):
         if "time" not in [column for column, _, _ in held]:
             held.insert(0, _times_of_index(frame.index, name))
         columns: dict[str, Any] = {}
-        facts = facts or Facts()
+        facts = checked_facts(name, facts or Facts())
         for column, unit, series in held:
             if column in columns:
                 raise InputError(f"{name}: column '{column}' is there twice")
@@ -175,6 +173,14 @@ def _times_of_index(index: pd.Index[Any], name: str) -> tuple[str, str | None, A
             "seconds as a column 'time', or call the index 'time [s]'"
         )
     return column, unit, index
+
+
+def checked_facts(name: str, facts: object) -> Facts:
+    """The facts of the run of a name, which have to be such."""
+    if not isinstance(facts, Facts):
+        kind = type(facts).__name__
+        raise InputError(f"{name}: facts are {kind}; fogml.Facts(unit=..., axis=...) was expected")
+    return facts
 
 
 def runs_of(given: Run | Sequence[Run]) -> tuple[Run, ...]:

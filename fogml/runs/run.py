@@ -19,7 +19,7 @@ from fogml.runs.arrival_times import sampling_times
 from fogml.runs.attitude import reference_deg_h, with_table_axis
 from fogml.runs.columns import coil_sensor_number, is_temperature
 from fogml.runs.dropouts import RULE, DropoutRule, Reading, last_reading, read_thermometer
-from fogml.runs.exchange import Exchange
+from fogml.runs.exchange import Exchange, checked_facts
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding, first_of_all
 from fogml.runs.possible import as_vector, check_columns, check_forwards
@@ -316,7 +316,7 @@ class Run(Exchange):
 
     def with_facts(self, facts: Facts) -> Run:
         """The run with other set-up facts."""
-        return self._with(self.columns, facts=facts)
+        return self._with(self.columns, facts=checked_facts(self.name, facts))
 
     def _with(self, columns: Mapping[str, FloatArray], **others: Any) -> Run:
         """The run with other columns, `facts` or `findings`, read by the same rule."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from fogml.errors import FogmlError, InputError
 from fogml.json_files import finite_json
 from fogml.processes import begin_worker, one_thread
+from fogml.settings_check import check_whole
 from fogml.tuning.held_out import HeldOut
 from fogml.tuning.plan import OBJECTIVES, Plan
 from fogml.tuning.storage import journal_to_fill, shown, storage_errors
@@ -138,8 +139,7 @@ def run_sweep(plan: Plan, workers: int = 1, progress: Progress | None = None) ->
     InputError
         If the plan can't be run, or the storage fails; finished trials are kept.
     """
-    if workers < 1:
-        raise InputError(f"workers {workers}: at least 1 is needed")
+    check_whole("workers", workers, 1)
     plan.check()
     if plan.references is None:
         plan = replace(plan, references=reference_choices(plan.read(), plan.seed))

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from fogml.errors import InputError, did_you_mean
+from fogml.settings_check import check_whole
 from fogml.twin.effect import Effect
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants, generator
@@ -35,6 +36,8 @@ def drawn_twin(twin: Twin, seed: int, number: int) -> Twin:
     and each effect that is suspected is on with its probability. What is not physical is brought to the
     nearest value that is. The same seed and number give the same twin.
     """
+    check_whole("seed", seed)
+    check_whole("number", number)
     rng = np.random.default_rng([seed, number, 0x7714])
     if twin.uncertainty is not None:
         off = twin.uncertainty.drawn(rng)
@@ -159,7 +162,7 @@ def draw_units(twin: Twin, count: int, *, repeats: int = 1, seed: int = 0) -> tu
     InputError
         If a number is below 1, or the seed negative.
     """
-    _at_least_one("units", count)
+    check_whole("count", count, 1)
     units = []
     for number in range(count):
         rng = generator(seed, number)
@@ -185,7 +188,7 @@ def repeat_unit(unit: Twin, count: int, *, seed: int = 0) -> tuple[Twin, ...]:
     InputError
         If the count is below 1, or the seed negative.
     """
-    _at_least_one("repeats", count)
+    check_whole("repeats", count, 1)
     repeats = []
     for number in range(count):
         rng = generator(seed, number)
@@ -215,8 +218,3 @@ def _noise(twin: Twin, rng: np.random.Generator) -> NoiseConstants:
 def _drawn(declared: Effect, twin: Twin, rng: np.random.Generator) -> EffectSetting:
     amplitude = declared.amplitude.draw(rng, twin.grade)
     return EffectSetting(amplitude, {q.name: q.draw(rng, twin.grade) for q in declared.shape})
-
-
-def _at_least_one(what: str, count: int) -> None:
-    if count < 1:
-        raise InputError(f"{what}: {count} is asked for; at least 1 is needed")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError
+from fogml.settings_check import check_whole
 from fogml.twin.quantities import Quantity, check_all
 
 URAD_S_IN_DEG_H = math.degrees(1e-6) * 3600.0
@@ -85,8 +85,7 @@ def generator(seed: int, number: int) -> np.random.Generator:
 
 
 def _checked(seed: int) -> int:
-    if seed < 0:
-        raise InputError(f"'seed' is {seed}; a whole number of 0 or above is needed")
+    check_whole("seed", seed)
     return seed
 
 

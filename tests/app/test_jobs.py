@@ -144,3 +144,23 @@ def test_a_refused_command_says_why(tmp_path: Path) -> None:
     told = jobs.in_full(name)
     # What it said last is no progress once it has ended.
     assert "none.csv" in told["stderr"] and told["files"] == [] and told["progress"] == ""
+
+
+def test_results_of_a_job_that_has_ended_are_looked_for_once(tmp_path: Path, monkeypatch) -> None:
+    """A page asks each second, and a month's fleet is thousands of folders."""
+    jobs = Jobs(tmp_path, 0)
+    ended, running = jobs.add(lambda results: ["docs"]), jobs.add(lambda results: ["docs"])
+    for name in (ended, running):
+        (tmp_path / "jobs" / name / "results" / "fleet.json").write_text("{}")
+    (tmp_path / "jobs" / ended / ENDED).write_text('{"status": 0, "seconds": 1.0}')
+    assert jobs.written("fleet.json") == [f"jobs/{ended}/results/fleet.json"]
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "glob", None)
+        assert jobs.written("fleet.json") == [f"jobs/{ended}/results/fleet.json"]
+    # Another job that gets the number of one that was removed is looked at anew.
+    (tmp_path / "jobs" / running / ENDED).write_text('{"status": 0, "seconds": 1.0}')
+    assert len(jobs.written("fleet.json")) == 2
+    jobs.remove(running)
+    assert jobs.add(lambda results: ["docs"]) == running
+    (tmp_path / "jobs" / running / ENDED).write_text('{"status": 0, "seconds": 1.0}')
+    assert jobs.written("fleet.json") == [f"jobs/{ended}/results/fleet.json"]

@@ -138,7 +138,7 @@ def test_a_folder_of_another_seed_is_left_alone(made: BlindFolder) -> None:
 
 
 def test_impossible_arguments_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="at least 1"):
+    with pytest.raises(InputError, match="of 1 or above"):
         make_cases(tmp_path, 0, 1)
     with pytest.raises(InputError, match="sample interval"):
         make_cases(tmp_path, 1, 1, sample_s=100.0)
@@ -150,7 +150,7 @@ def test_a_case_is_the_same_whatever_the_part(made: BlindFolder, tmp_path: Path)
     part = {name: digest for name, digest in digests(tmp_path).items() if "SHA256SUMS" not in name}
     assert part == {name: digest for name, digest in digests(made.path).items() if "0003" in name}
     assert len(part) > 4
-    with pytest.raises(InputError, match="at least 1"):
+    with pytest.raises(InputError, match="of 1 or above"):
         make_cases(tmp_path, 1, SEED, SAMPLE_S, first=0)
 
 

@@ -177,6 +177,8 @@ TABLE = pd.DataFrame({"time": [0.0]})
         (lambda: check_model(Ridge()), "a drift model is needed, found Ridge"),  # type: ignore[arg-type]
         (lambda: make_model("polynomial", ["T"]), "a text such as"),  # type: ignore[arg-type]
         (lambda: Run("x", STILL.columns, {"unit": "U"}), "x: facts are dict"),  # type: ignore[arg-type]
+        (lambda: STILL.with_facts({"unit": "U"}), "facts are dict"),  # type: ignore[arg-type]
+        (lambda: Run.from_pandas(STILL.to_pandas(), "x", {"unit": "U"}), "x: facts are dict"),  # type: ignore[arg-type]
     ],
 )
 def test_what_is_another_thing_than_asked_is_named(action: Callable[[], object], told: str) -> None:

@@ -6,11 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import sklearn
-from sklearn.base import is_regressor
+from sklearn.base import clone, is_regressor
 from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut, cross_validate
+from sklearn.pipeline import Pipeline, make_pipeline
 from threadpoolctl import threadpool_limits
 
 from fogml.errors import InputError
+from fogml.features.features import Features
 from fogml.models.linear import LinearRegressor
 from fogml.models.names import make_model
 from fogml.runs.run import Run
@@ -32,9 +34,9 @@ def test_the_score_is_the_share_of_the_variance_that_is_told() -> None:
     assert is_regressor(model)
     assert model.score(other) == pytest.approx(1.0 - (1 / 25) / (spread + 1 / 25), abs=2e-3)
     assert make_model("mean").fit(run(0)).score(run(0)) == pytest.approx(0.0, abs=1e-3)
-    assert model.score([other, run(2)]) < 1.0 and model.score(other, 4.0) < model.score(other)
+    assert model.score([other, run(2)]) < 1.0 and model.score(other, averaging_s=4.0) < model.score(other)
     with pytest.raises(InputError, match="no run fills one average of 100000 s"):
-        model.score(other, 1e5)
+        model.score(other, averaging_s=1e5)
 
 
 def test_a_grid_search_over_runs_finds_the_form() -> None:
@@ -42,6 +44,43 @@ def test_a_grid_search_over_runs_finds_the_form() -> None:
     search = GridSearchCV(make_model("polynomial"), {"features": ["T", "T^1..2"]}, cv=KFold(2)).fit(runs)
     assert search.best_params_ == {"features": "T^1..2"}
     assert search.best_estimator_.score(run(9)) > 0.9
+
+
+@pytest.mark.parametrize("name", ["mean", "polynomial", "mixed-effects"])
+def test_a_model_at_the_end_of_a_pipeline_is_the_model_alone(name: str) -> None:
+    pipeline = Pipeline([("model", make_model(name))]).fit([run(0), run(1)])
+    alone = make_model(name).fit([run(0), run(1)])
+    assert np.array_equal(pipeline.predict(run(2)), alone.predict(run(2)))
+    assert pipeline.score([run(2)]) == alone.score(run(2))
+
+
+@pytest.mark.parametrize("name", ["auto", "joint", "mean", "polynomial", "mixed-effects"])
+def test_targets_beside_runs_are_refused(name: str) -> None:
+    for call in (make_model(name).fit, make_model("mean").fit(run(0)).score):
+        with pytest.raises(InputError, match="the runs' own; give runs alone"):
+            call([run(0)], [1.0])
+
+
+def test_features_give_the_frames_that_are_asked_for() -> None:
+    one = run(0)
+    plain = Features("T, dT").transform(one)
+    pipeline = make_pipeline(Features("T, dT"), "passthrough").set_output(transform="pandas")
+    assert isinstance(plain, np.ndarray)
+    for frame in (pipeline.fit_transform(one), clone(pipeline).fit_transform(one)):
+        pd.testing.assert_frame_equal(frame, pd.DataFrame(plain, columns=["T", "dT"]))
+    assert Features("T, dT").set_output(transform="default").fit_transform(one).tolist() == plain.tolist()
+    with sklearn.config_context(transform_output="pandas"):
+        assert list(Features("T").fit_transform(one)) == ["T"]
+    with pytest.raises(InputError, match="known are default, pandas, polars"):
+        Features("T").set_output(transform="xarray")
+
+
+def test_features_of_what_is_no_run_are_refused() -> None:
+    for given in ([run(0), run(1)], one_frame := run(0).to_pandas(), one_frame.to_numpy()):
+        with pytest.raises(InputError, match="needed, found"):
+            Features("T").transform(given)
+    with pytest.raises(InputError, match="runs are needed, found ndarray"):
+        Features("T").fit(one_frame.to_numpy())
 
 
 @pytest.mark.parametrize("name", ["auto", "mixed-effects", "polynomial"])

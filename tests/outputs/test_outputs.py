@@ -124,9 +124,15 @@ class Killed(BaseException):
     """Stands for a kill: nothing is cleaned up after it."""
 
 
+@pytest.mark.parametrize("locks", [True, False])
 @pytest.mark.parametrize("place", range(12))
-def test_a_kill_between_two_renames_is_made_good_by_the_next_writer(tmp_path, monkeypatch, place):
+def test_a_kill_between_two_renames_is_made_good_by_the_next_writer(tmp_path, monkeypatch, place, locks):
     out = tmp_path / "out"
+    if not locks:
+        with subprocess.Popen([sys.executable, "-c", ""]) as dead:
+            told = json.dumps({"pid": dead.pid, "host": socket.gethostname(), "started": "1"})
+        monkeypatch.setattr("fogml.locks.this_process", lambda: told)
+        monkeypatch.setattr("fogml.locks.fcntl", None)
     write(out, a="old", model__w="old", model__x="old", mine="mine")
     count = 0
 
@@ -149,6 +155,8 @@ def test_a_kill_between_two_renames_is_made_good_by_the_next_writer(tmp_path, mo
     except Killed:
         pass
     monkeypatch.undo()
+    if not locks:
+        monkeypatch.setattr("fogml.locks.fcntl", None)
     settle(out)
     old = {"a": "old", "model/w": "old", "model/x": "old", "mine": "mine"}
     new = {"a": "new", "b": "new", "model/w": "new", "mine": "mine"}
@@ -453,3 +461,13 @@ def test_an_output_may_have_as_long_a_name_as_the_system_takes(tmp_path, parts):
             pass
     assert (out / "x").read_text() == "1"
     assert [entry.name for entry in tmp_path.iterdir()] == [parts[0]]
+
+
+def test_a_disk_that_is_full_at_the_begin_is_told_with_the_output(tmp_path, monkeypatch):
+    def full(handle, text, offset):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "pwrite", full)
+    with pytest.raises(OSError, match=r"No space left on device: '.*out'"), sole_writer(tmp_path / "out"):
+        pass
+    assert list(tmp_path.iterdir()) == []

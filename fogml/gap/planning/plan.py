@@ -42,6 +42,7 @@ from fogml.gap.planning.separating import Member, distances, least_distance, log
 from fogml.gap.result_parts import Rehearsed
 from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
+from fogml.settings_check import check_whole
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import NAMES
@@ -158,6 +159,8 @@ def plan_runs(
         raise InputError(
             "nothing is asked for; name constants or effects with --want, or a pair with --separate"
         )
+    check_whole("seed", seed)
+    check_whole("most", most, 1)
     if criterion not in ("D", "A"):
         raise InputError(f"criterion '{criterion}': D or A was expected")
     if not 1 <= runs <= MOST_PLANNED:

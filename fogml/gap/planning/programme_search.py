@@ -9,6 +9,7 @@ import numpy as np
 
 from fogml.gap.planning.programme_design import Design
 from fogml.gap.planning.programme_family import Family
+from fogml.settings_check import check_whole
 
 HOUR_PRICE = 0.01
 """What an hour must pay: standard errors 1 % smaller, or distances 1 % longer."""
@@ -76,6 +77,8 @@ def search(
     progress
         Told how many were.
     """
+    check_whole("seed", seed)
+    check_whole("most", most, 1)
     rng = np.random.default_rng(seed)
     tried: dict[Design, Tried] = {}
 
