@@ -57,8 +57,8 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
                     "color": colour,
                     "pattern": {"shape": pattern, "fillmode": "overlay", "fgcolor": "white", "size": 6},
                 },
-                customdata=[e.gain for e in rows],
-                hovertemplate="%{y}: %{short(customdata)} nats<extra></extra>",
+                customdata=[number(e.gain) for e in rows],
+                hovertemplate="%{y}: %{customdata} nats<extra></extra>",
                 row=1,
                 col=1,
             )

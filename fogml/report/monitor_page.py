@@ -87,6 +87,7 @@ def unit_page(unit: Mapping[str, Any], limit: float) -> str:
     label = unit_label(unit)
     last = unit["runs"][-1]
     beyond = last["beyond_interval"]
+    since = "; of the runs since the change" if unit["alarms"] else ""
     return render(
         "monitor_unit.html",
         title=f"{label} in service",
@@ -96,7 +97,10 @@ def unit_page(unit: Mapping[str, Any], limit: float) -> str:
             Tile("Runs", str(len(unit["runs"]))),
             Tile("Bias left, last run", number(last["level"]), "deg/h"),
             Tile(
-                "Evidence of change", against(unit["statistic"][-1], limit), "", f"alarm at {stated(limit)}"
+                "Evidence of change",
+                against(unit["statistic"][-1], limit),
+                "",
+                f"alarm at {stated(limit)}{since}",
             ),
             Tile("Outside training, last run", percent(last["outside_training"])),
             *(

@@ -140,8 +140,10 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
             error_y=bars,
             line={"color": style.TRAINING, "width": 1},
             marker={"size": 7, "color": style.BLUE},
-            customdata=[run["run"] for run in unit["runs"]],
-            hovertemplate="%{customdata}<br>%{short(y, 4)}<extra></extra>",
+            customdata=[
+                [run["run"], number(value, 4)] for run, value in zip(unit["runs"], values, strict=True)
+            ],
+            hovertemplate="%{customdata[0]}<br>%{customdata[1]}<extra></extra>",
             showlegend=False,
             row=row,
             col=1,
@@ -150,7 +152,9 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
             seen = [value for value in values if value is not None]
             figure.update_yaxes(**log_axis(min(seen), max(seen)), row=row, col=1)
         if name == "level":
-            style.floor_lines(figure, unit["runs"][-1]["half_width"], row)
+            half = unit["runs"][-1]["half_width"]
+            style.floor_lines(figure, half, row)
+            figure.update_yaxes(range=_with_room(half, values, bars), row=row, col=1)
         off = [one["index"] for one in unit["outliers"] if one["figure"] == name]
         if off:
             crosses = [age[i] for i in off], [values[i] for i in off]
@@ -175,6 +179,14 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
             "which does not count for what is usual. Dashed: the model's 90 % interval for averages."
         ),
     )
+
+
+def _with_room(half: float, values: Sequence[float | None], bars: Mapping[str, Any]) -> list[float]:
+    """Ends of an axis that holds the values, their bars and lines at `half` on either side of zero."""
+    told = zip(values, bars["array"], bars["arrayminus"], strict=True)
+    ends = [end for value, up, down in told if value is not None for end in (value + up, value - down)]
+    low, high = min([-half, *ends]), max([half, *ends])
+    return [low - 0.06 * (high - low), high + 0.06 * (high - low)]
 
 
 def _bars(runs: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:

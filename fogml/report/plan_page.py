@@ -77,8 +77,8 @@ def errors_drawing(values: Mapping[str, Any]) -> Drawing | None:
     if not shares:
         return None
     names, sizes = [name for name, _ in shares], [share for _, share in shares]
-    shown = "%{y}: %{short(x)}<extra></extra>"
-    trace = style.points(sizes, names, None, style.BLUE, "diamond", 11, hovertemplate=shown)
+    trace = style.points(sizes, names, None, style.BLUE, "diamond", 11)
+    trace.update(customdata=list(map(number, sizes)), hovertemplate="%{y}: %{customdata}<extra></extra>")
     figure = go.Figure(trace)
     figure.add_vline(x=1.0, line=style.FLOOR_LINE)
     figure.update_xaxes(

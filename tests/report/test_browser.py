@@ -53,6 +53,17 @@ def pages() -> dict[str, str]:
     return every_page() | pages_of_many() | procedure_pages()
 
 
+_FIELD = re.compile(r"[xyz]|text|customdata(\[\d\])?")
+
+
+def test_what_stands_beside_a_pointer_is_of_what_plotly_knows() -> None:
+    for html in pages().values():
+        for figure in Page(html).figures:
+            for trace in figure.get("data", ()):
+                for told in re.findall(r"%\{(.*?)\}", trace.get("hovertemplate", "")):
+                    assert _FIELD.fullmatch(told.partition(":")[0]), told
+
+
 def test_every_template_is_among_the_pages() -> None:
     assert set(KINDS) == set(pages())
     used = {name for _, name in page._environment().cache}
