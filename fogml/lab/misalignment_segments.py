@@ -16,7 +16,7 @@ from fogml.numerals import listed, short
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.raw_table import numbered_row
 from fogml.runs.run import Run
-from fogml.runs.transitions import MARGIN_BEYOND_S, time_to_rate_s, transition_mask
+from fogml.runs.transitions import transition_mask, usual_margin_s
 from fogml.runs.turning import LEAST_RATE_DEG_S, turning
 
 
@@ -184,10 +184,9 @@ def _check_left(rows: Rows, run: Run, kept: BoolArray, rest: BoolArray) -> None:
         raise InputError(
             f"{rows.source}, {rows.row_name(first)}: nothing is left of the rest of "
             f"{short(run.time[last] - run.time[first], 4)} s{told}, as "
-            f"{short(time_to_rate_s(run) + MARGIN_BEYOND_S)} s and "
-            "more are cut about each change of the rate, by the longest time that table and gyro take to "
-            f"settle; {'lose fewer samples, ' if lost else ''}let rests last longer, or the table accelerate "
-            "faster"
+            f"{short(usual_margin_s(run))} s and more are cut before and after each change of the rate, by "
+            f"the longest time that table and gyro take to settle; {'lose fewer samples, ' if lost else ''}"
+            "let rests last longer, or the table accelerate faster"
         )
 
 

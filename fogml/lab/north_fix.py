@@ -249,7 +249,8 @@ def standing(
     edges = np.concatenate([[0], np.flatnonzero(np.diff(stay)) + 1, [len(stay)]])
     levels = np.array([np.median(gyro[a:b]) for a, b in pairwise(edges.tolist())])
     every = (len(gyro), len(gyro))
-    begins, ends = unsettled_rows(gyro, edges, np.diff(levels), (0, 0), every, (share, share))
+    steps = np.diff(levels)
+    begins, ends = unsettled_rows(gyro, edges[:-1], edges[1:], steps, (0, 0), every, (share, share))
     length = np.diff(edges)[stay]
     row, most = np.arange(len(stay)) - edges[stay], (length - LEAST_ROWS) // 2
     out = (row < np.minimum(begins, most)) & (stay > 0)

@@ -129,7 +129,9 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
     settling = leaving = 0
     if settle_s is None:
         heights = 3600.0 * np.diff(rate)[steps[1:-1] - 1]
-        settling, leaving = unsettled_rows(output, steps, heights, (SETTLING_ROWS, 0), (len(rate), reach))
+        settling, leaving = unsettled_rows(
+            output, steps[:-1], steps[1:], heights, (SETTLING_ROWS, 0), (len(rate), reach)
+        )
     rows = []
     for start, stop in zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True):
         settled, left, most = start, stop, max(SETTLING_ROWS, (stop - start) // 2)

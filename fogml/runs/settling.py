@@ -74,7 +74,8 @@ def settling_rows(
 
 def unsettled_rows(
     output: FloatArray,
-    edges: IndexArray,
+    begin: IndexArray,
+    end: IndexArray,
     heights: FloatArray,
     first: tuple[int, int],
     reach: tuple[int, int],
@@ -89,8 +90,8 @@ def unsettled_rows(
     ----------
     output
         The gyro's output, shape (n,).
-    edges
-        Rows at which plateaus begin, the first row and n among them, shape (k + 1,).
+    begin, end
+        Rows [begin, end) of plateaus, the first row and the last among them, each of shape (k,).
     heights
         Steps between them, shape (k - 1,).
     first
@@ -100,7 +101,7 @@ def unsettled_rows(
     share
         Of a step, what may lack at begins and at ends.
     """
-    begin, end, count = edges[:-1], edges[1:], len(output)
+    count = len(output)
     lasting = end - begin >= LEAST_ROWS
     begins, ends = lasting[1:], lasting[:-1]
     settling, leaving = 0, 0

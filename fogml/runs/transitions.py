@@ -45,12 +45,10 @@ def find_transitions(run: Run) -> IndexArray:
     return _changes(run).start
 
 
-def time_to_rate_s(run: Run, settled_share: float = 0.02, noises: float = 6.0) -> float:
+def time_to_rate_s(run: Run) -> float:
     """The longest time the table takes to reach its rate [s]; 0 if it never changes.
 
-    Where the recorded rate steps at once it is a command, and the gyro tells the time: until it
-    stays within `settled_share` of the step, or so many standard deviations of its noise, about the new
-    plateau. A step of less than twice that noise tells nothing.
+    Where the recorded rate steps at once it is a command, and the gyro tells the time.
     """
     changes = _changes(run)
     if len(changes.start) == 0:
@@ -60,7 +58,16 @@ def time_to_rate_s(run: Run, settled_share: float = 0.02, noises: float = 6.0) -
         float(np.minimum(np.diff(run.time[start : stop + 1]), run.sample_s).sum())
         for start, stop in zip(changes.start, changes.stop, strict=True)
     )
-    return max(longest, _gyro_settling_s(run, changes, settled_share, noises))
+    return max(longest, _gyro_settling_s(run, changes, changes.start))
+
+
+def usual_margin_s(run: Run) -> float:
+    """What is cut before and after changes of the table's rate at least [s].
+
+    By `MARGIN_BEYOND_S` more than the gyro takes to settle after what is recorded of a change.
+    """
+    changes = _changes(run)
+    return _gyro_settling_s(run, changes, changes.stop) + MARGIN_BEYOND_S
 
 
 def transition_mask(run: Run, margin_s: float | None = None, others: IndexArray | None = None) -> BoolArray:
@@ -72,9 +79,9 @@ def transition_mask(run: Run, margin_s: float | None = None, others: IndexArray 
         The run.
     margin_s
         Samples within this time of a change are cut [s]; by default m = t_z + 2.5 s with t_z the
-        table's time to rate, within the source's bounds t_z < m < t_z + 5 s; after a change as long as all
-        changes together show that gyro or table have not settled, before one as long as they show that these
-        have left, the recorded rate being late.
+        table's time to rate beyond what is recorded of the change, within the source's bounds
+        t_z < m < t_z + 5 s; after a change as long as all changes together show that gyro or table have not
+        settled, before one as long as they show that these have left, the recorded rate being late.
     others
         Rows at which something else changes, as a fixture's tilt: what is after one tells nothing of how the
         change of the rate before it settles.
@@ -96,14 +103,12 @@ def transition_mask(run: Run, margin_s: float | None = None, others: IndexArray 
     changes, time = _changes(run), run.time
     by_default = margin_s is None
     if margin_s is None:
-        settled_s, left_s = _unsettled_s(run, changes, time_to_rate_s(run) + MARGIN_BEYOND_S, others)
+        settled_s, left_s = _unsettled_s(run, changes, usual_margin_s(run), others)
     else:
         settled_s = left_s = margin_s
     starts = changes.start
     first = np.searchsorted(time, time[starts] - left_s)
-    last = np.searchsorted(time, time[starts] + settled_s, side="right")
-    if by_default:
-        last = np.maximum(last, changes.stop)
+    last = np.searchsorted(time, time[changes.stop if by_default else starts] + settled_s, side="right")
     mask = np.zeros(len(run), dtype=np.bool_)
     for begin, end in zip(np.minimum(first, np.maximum(starts - 1, 0)), last, strict=True):
         mask[begin:end] = True
@@ -187,23 +192,29 @@ def _median_of_three(values: FloatArray) -> FloatArray:
     return made
 
 
-def _gyro_settling_s(run: Run, changes: _Changes, settled_share: float, noises: float) -> float:
-    """The longest time the gyro takes to settle on its new plateau after a change [s].
+def _gyro_settling_s(
+    run: Run, changes: _Changes, after: IndexArray, settled_share: float = 0.02, noises: float = 6.0
+) -> float:
+    """The longest time the gyro takes to settle on its new plateau, from rows of each change on [s].
 
-    Of a table that hardly turns about the input axis, the share is that of the step as it is where the run's
-    others do: what Earth rate does in a turn is no settling.
+    Until it stays within `settled_share` of the step, or so many standard deviations of its noise, about the
+    new plateau. A step of less than twice that noise tells nothing. Of a table that hardly turns about the
+    input axis, the share is that of the step as it is where the run's others do: what Earth rate does in a
+    turn is no settling.
     """
+    if len(after) == 0:
+        return 0.0
     clean = _median_of_three(run.gyro)
     noise = white_noise(clean)
     edges = np.concatenate([[0], changes.start, [len(run)]])
     plateaus, steps, turns = [], [], []
-    for before, start, stop in zip(edges[:-2], edges[1:-1], edges[2:]):
-        limit = np.searchsorted(run.time, run.time[start] + LONGEST_TRANSITION_S)
-        plateau = slice(int(start), min(int(stop), int(limit)))
+    for before, start, begin, stop in zip(edges[:-2], edges[1:-1], after, edges[2:], strict=True):
+        limit = np.searchsorted(run.time, run.time[begin] + LONGEST_TRANSITION_S)
+        plateau = slice(int(begin), min(int(stop), int(limit)))
         length = plateau.stop - plateau.start
         if length < LEAST_ROWS:
             continue
-        earlier, later = slice(max(before, start - length), start), slice(start + length // 2, plateau.stop)
+        earlier, later = slice(max(before, start - length), start), slice(begin + length // 2, plateau.stop)
         old, new = (float(np.median(clean[rows])) for rows in (earlier, later))
         plateaus.append((plateau, new))
         steps.append(abs(new - old))
@@ -233,21 +244,24 @@ def _unsettled_s(
     if len(changes.start) == 0:
         return least_s, least_s
     ends = changes.start if others is None else np.union1d(changes.start, others)
-    edges = np.concatenate([[0], ends, [len(run)]])
+    turns = np.isin(ends, changes.start)
+    begins = ends.copy()
+    begins[turns] = changes.stop
+    edges = np.append(0, begins), np.append(ends, len(run))
     first = max(1, round(least_s / run.sample_s))
     reach = max(round(LONGEST_TRANSITION_S / run.sample_s), LEAST_ROWS)
-    levels = _middles(run.gyro, edges, reach)
-    heights = np.where(np.isin(ends, changes.start), levels[1:, 0] - levels[:-1, 1], 0.0)
+    levels = _middles(run.gyro, *edges, reach)
+    heights = np.where(turns, levels[1:, 0] - levels[:-1, 1], 0.0)
     share = (SHARE, _LATE_SHARE)
-    settled, left = unsettled_rows(run.gyro, edges, heights, (first, first), (reach, reach), share)
-    plateaus = np.minimum(np.diff(changes.start, append=len(run)), reach)
+    settled, left = unsettled_rows(run.gyro, *edges, heights, (first, first), (reach, reach), share)
+    plateaus = np.minimum(np.append(changes.start[1:], len(run)) - changes.stop, reach)
     longest = 0.5 * float(min(plateaus[plateaus >= 4 * first], default=0)) * run.sample_s
     settled_s = least_s if settled <= first else max(least_s, min(settled * run.sample_s, longest))
     # What another rate has made is told by no part of a plateau, however short: it may be lost altogether.
     return settled_s, max(least_s, left * run.sample_s)
 
 
-def _middles(series: FloatArray, edges: IndexArray, reach: int) -> FloatArray:
+def _middles(series: FloatArray, begins: IndexArray, ends: IndexArray, reach: int) -> FloatArray:
     """Means in the middle of plateaus, of their first rows and of their last, `reach` at most; (k, 2).
 
     A clock that is early or late by a quarter of that leaves them as they are.
@@ -257,5 +271,5 @@ def _middles(series: FloatArray, edges: IndexArray, reach: int) -> FloatArray:
         quarter = (last - first) // 4
         return float(series[first + quarter : last - quarter].mean())
 
-    pairs = zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+    pairs = zip(begins.tolist(), ends.tolist(), strict=True)
     return np.array([(mean(a, min(b, a + reach)), mean(max(a, b - reach), b)) for a, b in pairs])

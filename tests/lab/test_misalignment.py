@@ -353,14 +353,17 @@ def test_turns_too_short_to_settle_are_told() -> None:
 
 
 def test_rests_that_are_cut_away_whole_are_told_with_how_much_is_cut() -> None:
-    """A table that takes 10 s to its rate, and rests of 15 s between."""
-    rows, time = samples(
-        UNIT, TILTS, (100.0,), rest_s=15.0, turn_s=60.0, acceleration_deg_s2=10.0, noise=1e-4
-    )
-    with pytest.raises(InputError, match=r"rest of 14\.9 s, as 1\d\.?\d* s and more are cut"):
-        from_samples(rows, time)
-    longer, time = samples(UNIT, TILTS, (100.0,), rest_s=60.0, acceleration_deg_s2=10.0, turn_s=60.0)
-    np.testing.assert_allclose(decouple(from_samples(longer, time)).K, UNIT.K, rtol=1e-6)
+    """A table that takes 10 s to its rate, and rests of 4 s between; of 15 s some is left."""
+
+    def recorded(rest_s: float) -> TableMeasurements:
+        times = {"rest_s": rest_s, "turn_s": 60.0, "acceleration_deg_s2": 10.0}
+        return from_samples(*samples(UNIT, TILTS, (100.0,), noise=1e-4, **times))
+
+    with pytest.raises(
+        InputError, match=r"rest of 3\.9 s, as 2\.\d+ s and more are cut before and after each"
+    ):
+        recorded(4.0)
+    np.testing.assert_allclose(decouple(recorded(15.0)).K, UNIT.K, rtol=1e-5)
 
 
 def test_an_axis_that_points_down_lies_within_its_interval() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -161,3 +163,24 @@ def test_rows_that_are_lost_at_random_hardly_make_the_scale_factor_less_sure() -
     rms = {lost: np.sqrt(np.mean(np.square(errors))) for lost, errors in off.items()}
     # By the rows that are left it is 1.2 times; where every lost row parted a piece, it was four times.
     assert rms[0.3] < 1.8 * rms[0.0] and max(largest) < 10.6
+
+
+def test_ramps_of_a_slow_table_leave_all_rates():
+    """At 5 deg/s2 the table takes 40 s from 100 to -100 deg/s, nearly as long as it stays there."""
+    levels = np.array([0.0, 10.0, -10.0, 50.0, -50.0, 100.0, -100.0, 0.0])
+    parts = [np.zeros(60)]
+    for start, stop in pairwise(levels.tolist()):
+        parts += [np.linspace(start, stop, int(abs(stop - start) / 5.0), endpoint=False), np.full(60, stop)]
+    table = np.concatenate(parts)
+    # The gyro follows with a lag: what is left of it is cut after each ramp, however short.
+    gyro = DEG_H * table
+    for row in range(1, len(gyro)):
+        gyro[row] += (gyro[row - 1] - gyro[row]) * np.exp(-2.0)
+    cubic = 2e-5 / 100.0**2
+    run = Run.from_columns(
+        time=np.arange(len(table)), gyro=gyro + DEG_H * cubic * table**3, rate=table, T=25.0 + 0.0 * table
+    )
+    found = figures(run, run.gyro - DEG_H * table)
+    rates = np.unique(levels)
+    assert found.nonlinearity == pytest.approx(closed_form(rates, rates + cubic * rates**3), rel=1e-3)
+    assert found.asymmetry == pytest.approx(0.0, abs=0.01)
