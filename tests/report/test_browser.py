@@ -60,6 +60,7 @@ def test_what_stands_beside_a_pointer_is_of_what_plotly_knows() -> None:
     for html in pages().values():
         for figure in Page(html).figures:
             for trace in figure.get("data", ()):
+                assert trace.get("name") is not None, "it would be called trace 0 beside the pointer"
                 for told in re.findall(r"%\{(.*?)\}", trace.get("hovertemplate", "")):
                     assert _FIELD.fullmatch(told.partition(":")[0]), told
 
