@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from fogml.arrays import FloatArray
+from fogml.errors import InputError, known_are
 from fogml.gap import thermal_families as thermal
 from fogml.gap.own_simulator import OwnEffect
 from fogml.gap.rows import READ, READ_GROUPS, Rows, slopes, through_nominal
@@ -264,6 +265,11 @@ def families_of(twin: Twin, scene: Scene, without: Iterable[str] = ()) -> tuple[
     left_out = set(without)
 
     def build_of(declared: Effect) -> Build:
+        if declared.family not in ("signature", *FAMILIES):
+            told = known_are(declared.family, ("signature", *FAMILIES), "families")
+            raise InputError(
+                f"effect '{declared.id}' is of family '{declared.family}', which is none; {told}"
+            )
         build = FAMILIES.get(declared.family) or signature_of(declared)
         return partial(_of_either_sign, build) if declared.id in twin.settings else build
 

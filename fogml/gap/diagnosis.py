@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -134,8 +135,8 @@ def diagnose(
 
 def check_cost(of_false_name: float) -> None:
     """Refuse a cost of a false name that is no number above 0."""
-    if not 0.0 < of_false_name < math.inf:
-        raise InputError(f"cost_of_false_name is {of_false_name:g}; a number above 0 is needed")
+    if not (isinstance(of_false_name, Real) and 0.0 < of_false_name < math.inf):
+        raise InputError(f"cost_of_false_name is {of_false_name!r}; a number above 0 is needed")
 
 
 def inferred(

@@ -165,7 +165,7 @@ class Rehearsed:
     named_as
         The class that is named.
     probability
-        Of that class.
+        Of that class, or of the likeliest one where none is named.
     """
 
     effect: str

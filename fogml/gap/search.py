@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,6 +133,14 @@ class Search:
         """Log posterior of each family alone on other whitened data, shape (n,); that of nothing is 0."""
         alone = self._averaged_alone(self._fits_to(data))
         return {f: gain + self.log_odds[f] for f, gain in alone.items()}
+
+    def on(self, data: FloatArray, most_causes: int) -> Search:
+        """The same search on other whitened data, shape (n,), for sets of so many causes at most."""
+        other, held = copy(self), copy(self.field)
+        held.base = replace(held.base, data=data)
+        other.field, other.priors = held, replace(self.priors, most_causes=most_causes)
+        other._fits = other._fits_to(data)
+        return other
 
     def _averaged_alone(self, fits: FloatArray) -> dict[int, float]:
         table = self.blocks.gains(np.empty((0, len(fits))), fits).sum(axis=0) + self.blocks.prior

@@ -94,10 +94,11 @@ def rehearsal_table(rehearsal: Sequence[Rehearsed], names: dict[str, str]) -> Ta
     if not rehearsal:
         return None
     return Table(
-        "If this acted | Shape | Size | >Shows [noise lengths] | It would be | >Probability",
+        "If this acted | Shape | Size | >Shows [noise lengths] | It would be | >Probability of the name",
         (_rehearsed(r, names) for r in sorted(rehearsal, key=lambda r: (_WORST.index(r.outcome), -r.length))),
-        caption="Each candidate is put into replays of these runs, without noise, and judged by the "
-        "evidence of one cause. Under a length of 3 nothing can be told.",
+        caption="Each candidate alone is put into replays of these runs, without noise; what is missed is "
+        "called unknown, or no gap. Shows: its length beside the constants, in standard deviations of the "
+        "noise; under 3 nothing can be told.",
     )
 
 
@@ -110,7 +111,7 @@ def _rehearsed(r: Rehearsed, names: dict[str, str]) -> tuple[str, ...]:
         _SIZES[r.size],
         number(r.length),
         outcome[r.outcome],
-        probability_words(r.probability),
+        MISSING if r.outcome == "missed" else probability_words(r.probability),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from itertools import pairwise
 
@@ -32,6 +33,7 @@ from fogml.testing.effect_inputs import (
 )
 from fogml.twin import registry
 from fogml.twin.effect import SET_UP, STAGES, Effect, NoiseEffect, ThermalEffect
+from fogml.twin.effect_guard import unguard
 from fogml.twin.inputs import REST, STAND_INS, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.quantities import GRADES, Quantity
@@ -149,7 +151,7 @@ def check_effect(effect: Effect | type[Effect] | str) -> None:
     AssertionError
         Naming the part of the contract that is not kept.
     """
-    known = registry.effect(effect) if isinstance(effect, str) else effect
+    known = unguard(copy(registry.effect(effect))) if isinstance(effect, str) else effect
     checked: Effect = known() if isinstance(known, type) else known
     inputs = standard_inputs()
     check_declaration(checked)

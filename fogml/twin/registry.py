@@ -13,12 +13,14 @@ from collections.abc import Iterable, Iterator
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import isabstract
+from numbers import Real
 from typing import Any, TypeVar
 
 from fogml.entry_points import EFFECTS as GROUP
 from fogml.entry_points import loaded, origin
 from fogml.errors import InputError, did_you_mean
 from fogml.twin.effect import STAGES, Effect
+from fogml.twin.effect_guard import guard, unguard
 from fogml.twin.quantities import Quantity
 
 _ID = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")
@@ -91,7 +93,7 @@ def unregister(id: str) -> Effect:
     """
     found = effect(id)
     del _catalogue[id]
-    return found
+    return unguard(found)
 
 
 def _discover() -> None:
@@ -141,6 +143,26 @@ def _add(declared: Any, origin: str) -> None:
         )
     if not isinstance(declared.amplitude, Quantity):
         raise InputError(f"{origin}: the amplitude of effect '{declared.id}' must be a Quantity")
+    _check_lists(declared, f"{origin}: effect '{declared.id}'")
     if declared.id in _catalogue:
         raise InputError(f"{origin}: there is an effect '{declared.id}' already; unregister it first")
+    guard(declared)
     _catalogue[declared.id] = declared
+
+
+def _check_lists(declared: Effect, owner: str) -> None:
+    """Refuse what should be a tuple of something and is not: a text is a tuple of letters."""
+
+    def is_of(given: Any, kind: type) -> bool:
+        return isinstance(given, tuple | list) and all(isinstance(one, kind) for one in given)
+
+    for name in ("needs", "conflicts", "sources", "compensated_by"):
+        if not is_of(getattr(declared, name), str):
+            raise InputError(f"{owner}: '{name}' is a tuple of texts, such as ('T',)")
+    if not is_of(declared.shape, Quantity):
+        raise InputError(f"{owner}: 'shape' is a tuple of Quantity")
+    groups = declared.told_by
+    if not (is_of(groups, tuple) and all(is_of(group, str) for group in groups)):
+        raise InputError(f"{owner}: 'told_by' is a tuple of groups of columns, such as (('supply',),)")
+    if not (is_of(declared.amplitudes, Real) and all(a != 0.0 for a in declared.amplitudes)):
+        raise InputError(f"{owner}: 'amplitudes' is a tuple of numbers other than 0")

@@ -215,6 +215,7 @@ def test_runs_that_can_not_be_are_told(tactical, runs):
     [
         ({"cost_of_false_name": 0.0}, "cost_of_false_name is 0"),
         ({"cost_of_false_name": float("nan")}, "cost_of_false_name is nan"),
+        ({"cost_of_false_name": "1"}, "cost_of_false_name is '1'"),
         ({"noise": "static.csv"}, "runs are needed, found str"),
         ({"without": "moistur"}, "did you mean 'moisture'"),
         ({"model": None}, "a twin, its name or file"),

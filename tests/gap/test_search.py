@@ -318,3 +318,34 @@ def test_what_looks_like_an_error_of_a_thermometer_acts_at_the_sensor():
     """Words and stage of an unknown cause stand side by side on the page."""
     reading = [f.id for f in unknown_families(STANDARD.grids) if "thermometer" in f.words]
     assert len(reading) == 2 and {STAGES[id] for id in reading} == {"sensor"}
+
+
+def test_a_search_on_other_data_finds_what_makes_those(found):
+    """What one family makes, without noise, is found to be that family."""
+    search = found.search
+    family = next(f for f in search.families_of("known") if search.families[f].id == "bias_polynomial")
+    node = search.blocks.nodes[search.blocks.rows[family].start]
+    data = 20.0 * search.field.block(node)[:, 0]
+    other = search.on(data, most_causes=1)
+    sets = other.explanations()
+    assert {len(e.members) for e in sets} <= {0, 1}
+    alone = {e.key[0]: e.score for e in sets if e.members}
+    nothing = next(e.score for e in sets if not e.members)
+    assert max(alone, key=alone.__getitem__) == family
+    assert alone[family] - nothing == pytest.approx(search.alone_on(data)[family])
+    # The search itself is as it was.
+    assert search.field.base.data is not other.field.base.data
+    assert search.priors.most_causes > 1
+
+
+def test_a_rehearsal_names_beside_something_unknown_that_holds_more():
+    """Of sets of two as of one: a class is as likely as all sets that hold it."""
+    search = SimpleNamespace(priors=STANDARD, families_of=lambda kind: [0, 1])
+    alone = {frozenset(): 0.0, frozenset({0}): 40.0, frozenset({1}): 20.0, frozenset({2}): 90.0}
+    likeliest, probability = ahead._most_likely(search, alone, 1.0)
+    assert likeliest == [0] and probability < 0.01
+    pairs = alone | {frozenset({0, 2}): 130.0, frozenset({2, 3}): 100.0}
+    likeliest, probability = ahead._most_likely(search, pairs, 1.0)
+    assert likeliest == [0] and probability > 0.8
+    assert ahead._most_likely(search, pairs, 1e6)[1] < 0.5
+    assert ahead._most_likely(search, {frozenset(): 0.0, frozenset({2}): 5.0}, 1.0) == ([], 0.0)

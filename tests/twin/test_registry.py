@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import copy
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import fogml.twin.effects
 from fogml.errors import InputError
 from fogml.twin import registry
 from fogml.twin.effect import BiasEffect
+from fogml.twin.effect_guard import unguard
 from fogml.twin.effects.shupe import ShupePure
 from fogml.twin.effects.unit import Ageing
+from fogml.twin.inputs import Inputs
 from tests.outside import in_new_process
 
 OUTSIDE = Path(__file__).parent / "outside_package"
@@ -162,6 +168,10 @@ class Unmeasured(ShupePure):
     amplitude = 3.0  # type: ignore[assignment]
 
 
+def _stating(**more: Any) -> type[ShupePure]:
+    return type("Stating", (ShupePure,), {"id": "stating"} | more)
+
+
 @pytest.mark.parametrize(
     ("declared", "message"),
     [
@@ -171,6 +181,11 @@ class Unmeasured(ShupePure):
         (Misplaced, "in stage 'nowhere'; stages are thermal"),
         (Unmeasured, "amplitude of effect 'unmeasured' must be a Quantity"),
         (dict, "is no effect"),
+        (_stating(needs="T"), "'needs' is a tuple of texts"),
+        (_stating(shape=(3.0,)), "'shape' is a tuple of Quantity"),
+        (_stating(told_by="supply"), "'told_by' is a tuple of groups of columns"),
+        (_stating(told_by=("supply",)), "'told_by' is a tuple of groups of columns"),
+        (_stating(amplitudes=(0.0,)), "'amplitudes' is a tuple of numbers other than 0"),
     ],
 )
 def test_what_is_no_whole_effect_is_refused(declared: type, message: str) -> None:
@@ -210,3 +225,61 @@ def test_a_faulty_outside_effect_is_named(tmp_path: Path, point: str, message: s
     )
     said = in_new_process(tmp_path, OUTSIDE, f"[fogml.effects]\n{point}\n", code).splitlines()
     assert len(said) == 2 and all(message in line for line in said)
+
+
+class _Foreign(BiasEffect):
+    id, code, title, stage = "foreign", "X9", "Foreign", "bias"
+    amplitude = ShupePure.amplitude
+
+    def __init__(self, made: Any) -> None:
+        self.made = made
+
+    def signature(self, inputs: Any, **shape: float) -> Any:
+        return self.made(inputs, **shape)
+
+
+@contextmanager
+def _foreign(made: Any) -> Iterator[BiasEffect]:
+    registry.register(_Foreign(made))
+    try:
+        yield registry.effect("foreign")  # type: ignore[misc]
+    finally:
+        registry.unregister("foreign")
+
+
+def _moves(inputs: Any) -> Any:
+    warm = inputs.temperature("T")
+    warm += 1.0
+    return warm
+
+
+@pytest.mark.parametrize(
+    ("signature", "message"),
+    [
+        (lambda inputs: 1.0 / 0.0, r"ends in ZeroDivisionError: .*test_registry.py, line \d+"),
+        (lambda inputs: inputs.drives["none"], "ends in KeyError: 'none'"),
+        (lambda inputs: np.where(inputs.time > 100.0, np.nan, 1.0), "gives nan at sample 12; finite"),
+        (lambda inputs: np.zeros(3), r"gives shape \(3,\); \(30,\), one number a sample"),
+        (lambda inputs: np.zeros((len(inputs.time), 2)), r"gives shape \(30, 2\)"),
+        (lambda inputs: None, "gives NoneType of object; real numbers"),
+        (lambda inputs: 1j * inputs.time, "real numbers"),
+        (_moves, "read-only"),
+    ],
+)
+def test_what_an_effect_of_a_package_gives_amiss_is_told_by_its_name(signature: Any, message: str) -> None:
+    inputs = Inputs(10.0 * np.arange(30), {"T": np.full(30, 20.0)}, np.zeros(30))
+    made = _foreign(lambda inputs, **shape: signature(inputs))
+    with made as foreign, pytest.raises(InputError, match=message) as told:
+        foreign.response(inputs)
+    assert str(told.value).startswith("effect 'foreign' (")
+    assert inputs.temperature("T").flags.writeable
+
+
+def test_what_an_effect_of_a_package_gives_well_is_left_as_it_is() -> None:
+    inputs = Inputs(10.0 * np.arange(3), {"T": np.array([19.0, 21.0, 22.0])}, np.zeros(3))
+    with _foreign(lambda inputs, **shape: 2.0 if shape else inputs.temperature("T") > 20.0) as foreign:
+        assert foreign.response(inputs).tolist() == [0.0, 1.0, 1.0]
+        assert foreign.response(inputs, width=1.0) == 2.0
+        assert copy.deepcopy(foreign).response(inputs).tolist() == [0.0, 1.0, 1.0]
+        assert unguard(copy.copy(foreign)).response(inputs).dtype == np.bool_
+    assert "signature" not in vars(registry.effect("ageing"))

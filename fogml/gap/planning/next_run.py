@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -207,7 +207,8 @@ def rehearse(
 
     Each is put into replays of these very runs, at its usual size and, if it was found, at that, in several
     forms. The data are what it is expected to make, without noise (G. Cowan et al., Eur. Phys. J. C 71 (2011)
-    1554), judged beside the constants by the evidence of one cause.
+    1554), judged beside the constants by the evidence of one cause, or of two where something unknown holds
+    them better than any one that is known.
     """
     setting = search.field.setting
     grade = setting.scene.grade
@@ -229,24 +230,37 @@ def rehearse(
 
 
 def _judged(search: Search, family: int, form: str, size: str, data: FloatArray, cost: float) -> Rehearsed:
-    priors, families = search.priors, search.families
-    scores = search.alone_on(data)
-    known = {f: s for f, s in scores.items() if families[f].kind == "known"}
-    best = max(known, key=known.__getitem__)
-    alike = sorted((f for f in known if known[f] > known[best] - priors.exchange), key=lambda f: -known[f])
-    own, others, unknown = (
-        float(np.logaddexp.reduce(np.array(told)))
-        for told in (
-            [known[f] for f in alike],
-            [-np.inf, *(s for f, s in known.items() if f not in alike)],
-            [0.0, *(s for f, s in scores.items() if f not in known)],
-        )
-    )
-    probability = priors.believed(float(np.logaddexp(own, others)) - unknown, own - others)
-    probability = at_cost(probability, cost)
+    families, length = search.families, search.field.base.length(data)
+    scores = {frozenset[int](): 0.0} | {frozenset((f,)): s for f, s in search.alone_on(data).items()}
+    alike, probability = _most_likely(search, scores, cost)
+    if probability < NAMED and length >= search.priors.least_detectable:
+        # What something unknown holds better alone may be named beside it.
+        scores = {frozenset(e.key): e.score for e in search.on(data, most_causes=2).explanations()}
+        alike, probability = _most_likely(search, scores, cost)
     named = probability >= NAMED
     outcome = "missed" if not named else "named" if family in alike else "mistaken"
     members = tuple(families[f].id for f in alike) if named else ()
-    return Rehearsed(
-        families[family].id, form, size, search.field.base.length(data), outcome, members, probability
-    )
+    return Rehearsed(families[family].id, form, size, length, outcome, members, probability)
+
+
+def _most_likely(
+    search: Search, scores: Mapping[frozenset[int], float], cost: float
+) -> tuple[list[int], float]:
+    """The class of known causes that is likeliest by the scores of sets, and its probability."""
+    priors, known = search.priors, set(search.families_of("known"))
+    best = {f: max(s for held, s in scores.items() if f in held) for f in known & frozenset().union(*scores)}
+    if not best:
+        return [], 0.0
+    first = max(best.values())
+    alike = sorted((f for f in best if best[f] > first - priors.exchange), key=lambda f: -best[f])
+
+    def total(kept: Callable[[frozenset[int]], bool]) -> float:
+        return float(
+            np.logaddexp.reduce(np.array([-np.inf, *(s for held, s in scores.items() if kept(held))]))
+        )
+
+    own = total(lambda held: bool(held & set(alike)))
+    others = total(lambda held: bool(held & known) and not held & set(alike))
+    unknown = total(lambda held: not held & known)
+    probability = priors.believed(float(np.logaddexp(own, others)) - unknown, own - others)
+    return alike, at_cost(probability, cost)
