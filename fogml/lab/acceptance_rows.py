@@ -94,14 +94,7 @@ QUANTITIES = (
         signed=True,
     ),
     Quantity("scale_factor_nonlinearity", "Scale factor nonlinearity", "标度因数非线性度", "ppm", _LADDER),
-    Quantity(
-        "scale_factor_asymmetry",
-        "Scale factor asymmetry",
-        "标度因数不对称性",
-        "ppm",
-        _BOTH_SENSES,
-        signed=True,
-    ),
+    Quantity("scale_factor_asymmetry", "Scale factor asymmetry", "标度因数不对称性", "ppm", _BOTH_SENSES),
     Quantity(
         "scale_factor_temperature_sensitivity",
         "Scale factor temperature sensitivity",
