@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fogml.numerals import MISSING, listed, number, percent, plural, stated
+from fogml.numerals import MISSING, against, listed, number, percent, plural, stated
 from fogml.report.blind_tables import (
     by_form_table,
     by_reality_table,
@@ -222,7 +222,7 @@ def gates_table(gates: Sequence[Mapping[str, Any]]) -> Table | None:
             (
                 one["key"],
                 f"{'≥' if one['at_least'] else '≤'} {stated(one['limit'])}",
-                number(one["value"]),
+                against(one["value"], one["limit"]),
                 "✓ met" if one["met"] else "✗ not met",
             )
             for one in gates

@@ -50,11 +50,24 @@ def value_text(value: float | None, form: str) -> str:
 
 def figure_text(row: Mapping[str, Any]) -> str:
     """A figure with its interval, such as ``2.1 % (1.2 % … 3.6 %)``."""
-    text = value_text(row["value"], row["format"])
+    text = _reached(row)
     if row["low"] is None or row["high"] is None:
         return text
     low, high = (value_text(row[end], row["format"]) for end in ("low", "high"))
     return f"{text} ({low} … {high})"
+
+
+def _reached(row: Mapping[str, Any]) -> str:
+    """The value, with more places than usual where it would seem to lie on what is wanted."""
+    value, form = row["value"], row["format"]
+    if value is None or form != "percent":
+        return value_text(value, form)
+    ends = [end for end in (row.get("wanted") or {}).values() if end is not None]
+    for places in range(1, 6):
+        told = round(100.0 * value, places) / 100.0
+        if all((told > end, told < end) == (value > end, value < end) for end in ends):
+            break
+    return percent(value, places)
 
 
 def wanted_text(row: Mapping[str, Any]) -> str:

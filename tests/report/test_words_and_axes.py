@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from fogml import numerals as words
 from fogml.pictures import braille, ticks
-from fogml.report.blind_tables import open_set_plot, spanned
+from fogml.report.blind_tables import figure_text, open_set_plot, spanned
 from fogml.report.monitor_words import _days
 from fogml.report.page import _breakable
 from fogml.report.style import log_axis, rounded_up, time_unit
@@ -179,3 +179,12 @@ def test_a_long_time_is_told_to_half_a_unit(days):
     each = {"day": 1.0, "days": 1.0, "month": 30.44, "months": 30.44, "year": 365.25, "years": 365.25}[unit]
     assert abs(int(count) * each - days) <= max(0.5 * each, 1.0 - days)
     assert (count == "1") is not unit.endswith("s")
+
+
+def test_a_share_just_short_of_what_is_wanted_is_seen_to_be_short() -> None:
+    row = {"format": "percent", "low": None, "high": None, "wanted": {"low": 0.87, "high": 0.93}}
+    assert [figure_text({**row, "value": value}) for value in (0.869996, 0.9, None)] == [
+        "86.9996 %",
+        "90.0 %",
+        "–",
+    ]
