@@ -45,29 +45,13 @@ def find_transitions(run: Run) -> IndexArray:
     return _changes(run).start
 
 
-def time_to_rate_s(run: Run) -> float:
-    """The longest time the table takes to reach its rate [s]; 0 if it never changes.
-
-    Where the recorded rate steps at once it is a command, and the gyro tells the time.
-    """
-    changes = _changes(run)
-    if len(changes.start) == 0:
-        return 0.0
-    # Of lost rows a change may have lasted through all or none; some change has hardly any.
-    longest = max(
-        float(np.minimum(np.diff(run.time[start : stop + 1]), run.sample_s).sum())
-        for start, stop in zip(changes.start, changes.stop, strict=True)
-    )
-    return max(longest, _gyro_settling_s(run, changes, changes.start))
-
-
 def usual_margin_s(run: Run) -> float:
     """What is cut before and after changes of the table's rate at least [s].
 
     By `MARGIN_BEYOND_S` more than the gyro takes to settle after what is recorded of a change.
     """
     changes = _changes(run)
-    return _gyro_settling_s(run, changes, changes.stop) + MARGIN_BEYOND_S
+    return _gyro_settling_s(run, changes) + MARGIN_BEYOND_S
 
 
 def transition_mask(run: Run, margin_s: float | None = None, others: IndexArray | None = None) -> BoolArray:
@@ -192,23 +176,21 @@ def _median_of_three(values: FloatArray) -> FloatArray:
     return made
 
 
-def _gyro_settling_s(
-    run: Run, changes: _Changes, after: IndexArray, settled_share: float = 0.02, noises: float = 6.0
-) -> float:
-    """The longest time the gyro takes to settle on its new plateau, from rows of each change on [s].
+def _gyro_settling_s(run: Run, changes: _Changes, settled_share: float = 0.02, noises: float = 6.0) -> float:
+    """The longest time the gyro takes to settle on its new plateau after what is recorded of a change [s].
 
     Until it stays within `settled_share` of the step, or so many standard deviations of its noise, about the
     new plateau. A step of less than twice that noise tells nothing. Of a table that hardly turns about the
     input axis, the share is that of the step as it is where the run's others do: what Earth rate does in a
     turn is no settling.
     """
-    if len(after) == 0:
+    if len(changes.stop) == 0:
         return 0.0
     clean = _median_of_three(run.gyro)
     noise = white_noise(clean)
     edges = np.concatenate([[0], changes.start, [len(run)]])
     plateaus, steps, turns = [], [], []
-    for before, start, begin, stop in zip(edges[:-2], edges[1:-1], after, edges[2:], strict=True):
+    for before, start, begin, stop in zip(edges[:-2], edges[1:-1], changes.stop, edges[2:], strict=True):
         limit = np.searchsorted(run.time, run.time[begin] + LONGEST_TRANSITION_S)
         plateau = slice(int(begin), min(int(stop), int(limit)))
         length = plateau.stop - plateau.start
