@@ -118,7 +118,8 @@ class Terminal:
         # In a file or a pipe a row is a line.
         bounded = sys.stdout.isatty() or "COLUMNS" in os.environ
         console = Console(highlight=False, markup=False, width=None if bounded else _UNBOUNDED)
-        lines = [[terminal_text(cell, sys.stdout.encoding) for cell in cells] for cells in (header, *rows)]
+        told = (header, *([_in_a_word(cell) for cell in cells] for cells in rows))
+        lines = [[terminal_text(cell, sys.stdout.encoding) for cell in cells] for cells in told]
         columns = list(zip(*lines, strict=True))
         # Columns move together before a word breaks.
         widths = _column_widths(columns, console.width - _BETWEEN * len(columns))
@@ -139,8 +140,7 @@ class Terminal:
         if table is None:
             return
         heads = [f"{name} [{unit}]" if unit else name for name, unit, _ in table.columns]
-        # A power of ten is one word.
-        rows = [[cell.replace(" × 10", "×10") for cell in row.cells] for row in table.rows[:most]]
+        rows = [list(row.cells) for row in table.rows[:most]]
         if any(row.mark == "chosen" for row in table.rows):
             heads.append("chosen")
             for row, cells in zip(table.rows, rows):
@@ -191,6 +191,14 @@ def _holds_figures(cells: Sequence[str]) -> bool:
     """Whether most of the cells that hold anything begin with a figure."""
     held = [cell for cell in cells if cell not in ("", "–")]
     return 2 * sum(map(bool, map(_FIGURE.match, held))) >= len(held)
+
+
+_SIGN = re.compile(r"^([≤≥±<>]) (?=[0-9])")
+
+
+def _in_a_word(cell: str) -> str:
+    """A figure with its power of ten, or the sign of a bound, as one word, which no line breaks."""
+    return _SIGN.sub(r"\1", cell.replace(" × 10", "×10"))
 
 
 def _column_widths(columns: Sequence[Sequence[str]], width: int) -> list[int] | None:

@@ -83,6 +83,14 @@ def test_no_figure_is_lost_where_they_do_not_fit(monkeypatch, capsys) -> None:
             assert letter in told
 
 
+def test_a_bound_stands_beside_its_sign(monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    rows = [["Bias instability of a gyro", "≤ 0.0313", "± 1.5"], ["Rate ramp", "≥ 1.2 × 10⁻⁵", "≤ 2"]]
+    Terminal().table("t", ["quantity", "before", "limit"], rows)
+    words = capsys.readouterr().out.split()
+    assert {"≤0.0313", "±1.5", "≥1.2×10⁻⁵", "≤2"} <= set(words)
+
+
 def test_a_table_without_names_has_no_head(capsys) -> None:
     Terminal().table("Export", ["", ""], [["weights", "72 bytes"]])
     assert [line.split() for line in capsys.readouterr().out.splitlines()] == [
