@@ -129,6 +129,14 @@ def _link(source: str | Path, target: str | Path) -> None:
     os.link(source, target, follow_symlinks=False)
 
 
+def link_or_copy(source: Path, target: Path) -> None:
+    """The same file under a second name, or a copy of it where files have one name alone."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+
+
 def give_name(source: Path, name: Path) -> None:
     """Let a whole file have a name that nothing else has, in one step where the file system has hard links.
 

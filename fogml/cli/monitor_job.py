@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from functools import cache
 from pathlib import Path
@@ -13,6 +13,7 @@ from fogml.cli.runs import check_named_once, note_wrong, open_run
 from fogml.cli.terminal import UNITS_SHOWN, Terminal
 from fogml.errors import InputError, counted, in_one_line
 from fogml.fleet.tasks import FAILED, FLEET
+from fogml.folders import link_or_copy
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.models.base import DriftModel
 from fogml.monitor.evidence import ChangePrior
@@ -54,20 +55,42 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
         refused=refused,
     )
     values = finite_json(told)
-    from fogml.report.monitor_page import monitor_page, unit_file, unit_page
+    from fogml.report.monitor_page import monitor_page
 
     with terminal.work("drawing"), whole_folder(home, shared=True) as folder:
         write_json(folder / "monitor.json", values, indent=1)
         (folder / "monitor.html").write_text(monitor_page(values), encoding="utf-8")
-        (folder / "units").mkdir()
-        for unit in values["units"]:
-            page = unit_page(unit, values["runs_between_false_alarms"])
-            (folder / "units" / unit_file(unit)).write_text(page, encoding="utf-8")
+        _write_units(values, home, folder / "units")
         settings.write_into(folder, "monitor")
     _print_monitor(values, terminal)
     terminal.result(values)
     terminal.say(f"Written to {settings.out}: open {home / 'monitor.html'}")
     return not refused and all(unit["state"] != "alarm" for unit in values["units"])
+
+
+def _write_units(values: Mapping[str, Any], home: Path, folder: Path) -> None:
+    """Write the units' pages; those of units of which nothing is new are the ones that are there.
+
+    Of hundreds of units in service a command tells something new of a few.
+    """
+    from fogml.report.monitor_page import made_here, unit_file, unit_page
+
+    known: dict[str, Any] = {}
+    limit = values["runs_between_false_alarms"]
+    try:
+        before = read_json(home / "monitor.json", "run the command again")
+        if before["runs_between_false_alarms"] == limit:
+            known = {unit_file(unit): unit for unit in before["units"]}
+    except (InputError, LookupError, TypeError, AttributeError):
+        pass  # nothing that this command wrote
+    folder.mkdir()
+    for unit in values["units"]:
+        name = unit_file(unit)
+        there = home / "units" / name
+        if known.get(name) == unit and made_here(there):
+            link_or_copy(there, folder / name)
+        else:
+            (folder / name).write_text(unit_page(unit, limit), encoding="utf-8")
 
 
 def _records(settings: MonitorSettings, terminal: Terminal) -> tuple[list[RunRecord], dict[str, str]]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+from fogml import __version__
 from fogml.fleet.summary import label_of
 from fogml.folders import safe_name
 from fogml.numerals import against, in_order_of_serial, number, percent, plural, stated
@@ -30,6 +32,15 @@ def unit_file(unit: Mapping[str, Any]) -> str:
     label = label_of(unit)
     digest = hashlib.sha256(f"{unit['unit']}\0{unit['axis']}".encode()).hexdigest()[:8]
     return f"{safe_name(label, '-', 80).strip('-.')}-{digest}.html"
+
+
+def made_here(page: Path) -> bool:
+    """Whether a page is there that this version of fogml has made."""
+    try:
+        with open(page, "rb") as file:
+            return f'content="fogml {__version__}"'.encode() in file.read(1000)
+    except OSError:
+        return False
 
 
 def monitor_page(monitor: Mapping[str, Any]) -> str:

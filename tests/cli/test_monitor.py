@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fogml.monitor.store import open_store
+from fogml.report import monitor_page
 from tests.monitor.service import write_model, write_run
 from tests.monitor.test_watch import service as records_of
 
@@ -145,3 +147,30 @@ def test_of_many_units_those_that_changed_are_shown_first(service, tmp_path, inv
     places = [told.stdout.index(f" U-{number} x ") for number in (11, 2, 9)]
     assert places == sorted(places) and " U-10 x " not in told.stdout
     assert "3 of 4 units are shown, those that changed first" in told.stdout
+
+
+def test_only_pages_of_units_of_which_something_is_new_are_drawn(service, tmp_path, invoke_json, monkeypatch):
+    model, _ = service
+    out, (record, *_) = tmp_path / "out", records_of(1)
+    open_store(str(tmp_path / "store")).add([replace(record, unit=unit, key=unit) for unit in ("A", "B")])
+    command = ("monitor", model, "-o", out, "--store", tmp_path / "store")
+    drawn, page = [], monitor_page.unit_page
+
+    def counted(unit, limit):
+        drawn.append(unit["unit"])
+        return page(unit, limit)
+
+    monkeypatch.setattr(monitor_page, "unit_page", counted)
+    invoke_json(*command)
+    before = {path.name: path.read_bytes() for path in (out / "units").iterdir()}
+    open_store(str(tmp_path / "store")).add([replace(record, unit="B", key="B2", run="later.csv")])
+    invoke_json(*command)
+    after = {path.name: path.read_bytes() for path in (out / "units").iterdir()}
+    assert drawn == ["A", "B", "B"]
+    assert before.keys() == after.keys() and sum(before[name] == after[name] for name in before) == 1
+    # At another limit, by another version, or where one was lost, they are made anew.
+    invoke_json(*command, "--false-alarm-every", 500)
+    next((out / "units").glob("A*")).write_text("of another version")
+    next((out / "units").glob("B*")).unlink()
+    invoke_json(*command, "--false-alarm-every", 500)
+    assert drawn[3:] == ["A", "B", "A", "B"]
