@@ -296,7 +296,8 @@ class ReaderProcess:
         name = signal.Signals(code).name if code in set(signal.Signals) else f"status {-code}"
         if self._timed_out or name == "SIGXCPU":
             return "reading it came to no end and was stopped"
-        return f"its reader crashed ({name})"
+        likely = ": for want of memory? A workbook may have a lone cell far from its table"
+        return f"its reader crashed ({name}{likely if name == 'SIGABRT' else ''})"
 
 
 def _finish(process: subprocess.Popen[bytes], owner: int) -> None:

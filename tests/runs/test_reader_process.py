@@ -41,6 +41,7 @@ def test_files_that_crash_or_hang_their_library_are_damaged_files():
     ("does", "told"),
     [
         ("os.kill(os.getpid(), signal.SIGSEGV)", r"its reader crashed \(SIGSEGV\)"),
+        ("os.abort()", r"SIGABRT: for want of memory\? A workbook may have a lone cell far from its table"),
         ("sys.exit(3)", r"its reader crashed \(status 3\)"),
         ("resource.setrlimit(resource.RLIMIT_CPU, (1, 1))\nwhile True: pass", "crashed|no end"),
         ("time.sleep(60)", "came to no end and was stopped"),
