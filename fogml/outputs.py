@@ -247,8 +247,8 @@ class _Staging:
 
     def move_in(self, target: Path) -> None:
         """Rename the entries of the content into a folder; after a kill in between, `settle` goes on."""
-        names = os.listdir(self.content)
-        if not self.is_committed and (len(names) > 1 or any(is_folder(target / name) for name in names)):
+        places = [home / name for name in os.listdir(self.content) for home in (target, self.content)]
+        if not self.is_committed and (len(places) > 2 or any(map(is_folder, places))):
             committed = target / self.path.name.replace(PARTIAL, COMMIT, 1)
             os.rename(self.path, committed)
             self.path = committed
@@ -272,8 +272,8 @@ class _Staging:
     def _move_entries(self, target: Path) -> None:
         for entry in sorted(self.content.iterdir()):
             place = target / entry.name
-            if is_folder(place):
-                # A folder that holds something is not replaced by renaming another over it.
+            if is_folder(place) or (is_folder(entry) and os.path.lexists(place)):
+                # A folder that holds something, or for a folder a link or file, is not replaced by renaming.
                 os.rename(place, self.path / secrets.token_hex(8))
             os.replace(entry, place)
 

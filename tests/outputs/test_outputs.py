@@ -68,6 +68,22 @@ def test_a_folder_is_replaced_and_keeps_what_is_not_of_it(tmp_path, way):
     assert os.listdir(tmp_path) == ["out"]
 
 
+@pytest.mark.parametrize("shared", [True, False])
+def test_a_folder_takes_the_place_of_a_link_or_a_file(tmp_path, way, shared):
+    """As of one that was moved to a larger disk; what the link leads to stays as it is."""
+    write(tmp_path, elsewhere__page="old", out__model="a file", out__mine="mine")
+    (tmp_path / "out" / "units").symlink_to("../elsewhere")
+    with whole_folder(tmp_path / "out", shared=shared) as folder:
+        write(folder, report="new", model__a="new", units__page="new")
+    assert tree(tmp_path) == {
+        "elsewhere/page": "old",
+        "out/report": "new",
+        "out/model/a": "new",
+        "out/units/page": "new",
+        "out/mine": "mine",
+    }
+
+
 @pytest.mark.parametrize("lacking", [(), ("link",)])
 def test_a_name_is_given_once_with_and_without_hard_links(tmp_path, monkeypatch, lacking):
     for name in lacking:
