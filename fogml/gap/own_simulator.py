@@ -12,6 +12,7 @@ of the column; what they leave of it is taken off the recording, so that recorde
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,7 +21,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.gap.model import AnyModel, Candidate, EffectValue, GyroModel, ModelOnRun, TwinModel
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Counterfactual, RunSeries
@@ -28,8 +29,10 @@ from fogml.runs.columns import REPLAYED
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.twin.effect import Effect
+from fogml.twin.effect_guard import as_series
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import NAMES, PRIOR_SD, nominal_columns
+from fogml.twin.quantities import GRADES
 from fogml.twin.registry import clashing, effects
 from fogml.twin.replay import inputs_of_run, replay
 from fogml.twin.twin import Twin
@@ -79,7 +82,13 @@ class OwnOnRun:
 
     def output(self, constants: Mapping[str, float]) -> FloatArray:
         """The replay [deg/h], shape (n,)."""
-        return np.asarray(self.on.output(constants), dtype=np.float64)
+        return self._told(self.on.output(constants), "output")
+
+    def _told(self, found: Any, what: str) -> FloatArray:
+        """What the simulator gave for the run, shape (n,); refused by name where that is no series."""
+        count = len(self.run)
+        told = as_series(found, count, f"{self.run.name}: {what} of the simulator '{self.model.name}'")
+        return np.broadcast_to(told, (count,))
 
     def slopes(self, constants: Mapping[str, float]) -> dict[str, FloatArray]:
         """Change of the replay with each recorded temperature [deg/h/degC], shape (n,) each.
@@ -101,32 +110,34 @@ class OwnOnRun:
             ).output(constants)
             for step in (self.step_degc, -self.step_degc)
         )
-        return np.asarray((np.asarray(up) - np.asarray(down)) / (2.0 * self.step_degc), dtype=np.float64)
+        ends = (self._told(end, "output at another temperature") for end in (up, down))
+        return np.asarray(np.subtract(*ends) / (2.0 * self.step_degc))
 
     def columns(self) -> FloatArray:
         """Response to a unit of each constant, shape (n, c); 0 where the run can't show one."""
         told, found = self.on.columns(), np.zeros((len(self.run), len(self.model.constants)))
         for column, constant in zip(found.T, self.model.constants):
-            column += told.get(constant.name, 0.0)
+            column += self._told(told.get(constant.name, 0.0), f"response to '{constant.name}'")
         return found
 
     def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
         """What is always a little off, one standard deviation of each [deg/h], shape (n,)."""
         key = tuple(constants.values())
         if key not in self.off_at:
-            self.off_at[key] = self.on.nuisances(constants)
+            off = self.on.nuisances(constants)
+            self.off_at[key] = {n: self._told(v, f"nuisance '{n}'") for n, v in off.items()}
         return self.off_at[key]
 
     def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
         """Of a candidate, per unit of its amplitude [deg/h], shape (n,)."""
-        return np.asarray(self.on.response(id, shape, constants), dtype=np.float64)
+        return self._told(self.on.response(id, shape, constants), f"response to '{id}'")
 
     def changed(
         self, id: str, shape: Mapping[str, float], amplitude: float, constants: Mapping[str, float]
     ) -> FloatArray:
         """What a candidate makes of the output at an amplitude [deg/h], shape (n,)."""
         value = EffectValue(id, amplitude, shape)
-        return np.asarray(self.on.output(constants, (value,))) - self.output(constants)
+        return self._told(self.on.output(constants, (value,)), f"output with '{id}'") - self.output(constants)
 
 
 def candidates_of(model: AnyModel) -> dict[str, Effect]:
@@ -141,6 +152,27 @@ def candidates_of(model: AnyModel) -> dict[str, Effect]:
         return {id: declared for id, declared in known.items() if not clashing(declared, model.twin.settings)}
     offered = dict(model.candidates())
     return {id: _declared(c, catalogue.get(id)) for id, c in offered.items()} if offered else catalogue
+
+
+def _check(model: GyroModel) -> None:
+    """Refuse what a simulator says of itself that a diagnosis can't go on with."""
+    what = f"the simulator '{model.name}'"
+    if model.grade not in GRADES:
+        raise InputError(f"{what}: grade is {model.grade!r}; {known_are(str(model.grade), GRADES, 'grades')}")
+    if not 0.0 <= model.memory_s < math.inf:
+        raise InputError(f"{what}: memory_s is {model.memory_s!r}; a number of 0 or above is needed")
+    names = [c.name for c in model.constants]
+    for c in model.constants:
+        if names.count(c.name) > 1 or not (math.isfinite(c.mean) and 0.0 <= c.sd < math.inf):
+            raise InputError(
+                f"{what}: constant '{c.name}' has mean {c.mean!r} and sd {c.sd!r}, and stands there "
+                f"{names.count(c.name)} times; a finite mean, an sd of 0 or above, and once is needed"
+            )
+    for name, value in vars(model.noise).items():
+        if not (1.0 if name.startswith("factor") else 0.0) <= value < math.inf:
+            raise InputError(
+                f"{what}: {name} of its noise is {value!r}; of 0 or above, a factor of 1 or above"
+            )
 
 
 def _declared(candidate: Candidate, alike: Effect | None) -> Effect:
@@ -162,9 +194,16 @@ def _declared(candidate: Candidate, alike: Effect | None) -> Effect:
 
 
 def plant_of(model: AnyModel) -> Twin:
-    """The twin whose plant tells temperatures that were not recorded: the model's, or the nominal one."""
+    """The twin whose plant tells temperatures that were not recorded: the model's, or the nominal one.
+
+    Raises
+    ------
+    InputError
+        If what a model says of itself is nothing that a diagnosis can go on with.
+    """
     if isinstance(model, TwinModel):
         return model.twin
+    _check(model)
     return load_twin("nominal")
 
 

@@ -66,10 +66,11 @@ class _Guarded:
             for values in 2 * locked:  # a view only after what it is a view of
                 with suppress(ValueError):
                     values.flags.writeable = True
-        return _series(found, None if inputs is None else len(inputs.time), owner)
+        return as_series(found, None if inputs is None else len(inputs.time), owner)
 
 
-def _series(found: Any, count: int | None, what: str) -> FloatArray:
+def as_series(found: Any, count: int | None, what: str) -> FloatArray:
+    """What foreign code gave, as finite numbers, one a sample or one for all; refused by `what` otherwise."""
     values = np.asarray(found)
     if values.dtype.kind not in "biuf":
         raise InputError(f"{what} gives {type(found).__name__} of {values.dtype}; real numbers are needed")

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
 from fogml.gap.diagnosis import diagnose
 from fogml.gap.model import Constant, EffectValue, NoisePrior
 from fogml.runs.run import Run
@@ -189,3 +190,48 @@ def test_a_simulator_is_asked_in_time_that_is_linear_in_the_runs():
         diagnose(Simulator(("creep",)), runs, (), plan=False)
         asked.append(len(ASKED) / (len(runs) + 1))
     assert asked[1] == pytest.approx(asked[0], rel=0.2)
+
+
+def _giving(**methods):
+    kind = type("Giving", (OnRun,), methods)
+    return type("Odd", (Simulator,), {"on": lambda self, run: kind(run)})(("creep",))
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (
+            _giving(output=lambda s, c, e=(): np.full(len(s.run), np.nan)),
+            "a: output .* gives nan at sample 1",
+        ),
+        (
+            _giving(output=lambda s, c, e=(): np.zeros(5)),
+            r"gives shape \(5,\); \(160,\)",
+        ),
+        (_giving(response=lambda s, *a: np.zeros(3)), "a: response to 'creep' .* gives shape"),
+        (
+            _giving(response=lambda s, *a: np.full(len(s.run), np.inf)),
+            "'creep' .* gives inf",
+        ),
+        (
+            _giving(nuisances=lambda s, c: {"line": "none"}),
+            "nuisance 'line' .* gives str of <U4",
+        ),
+        (
+            Simulator(("creep",), grade="excellent"),
+            "grade is 'excellent'; grades are tactical",
+        ),
+        (Simulator(("creep",), memory_s=-1.0), "memory_s is -1.0; a number of 0 or above"),
+        (Simulator(("creep",), noise=NoisePrior(float("nan"), 0.0, 0.0)), "N of its noise is nan"),
+        (Simulator(("creep",), noise=NoisePrior(0.1, 0.0, 0.0, 0.5)), "factor_N of its noise is 0.5"),
+        (
+            Simulator(constants=(Constant("offset", "deg/h", 0.0, -3.0),)),
+            "'offset' has mean 0.0 and sd -3.0",
+        ),
+        (Simulator(constants=2 * (Constant("offset", "deg/h", 0.0, 3.0),)), "stands there 2 times"),
+    ],
+)
+def test_what_a_simulator_gives_amiss_is_told_by_its_name(model, message):
+    runs = made_runs()
+    with pytest.raises(InputError, match=message):
+        diagnose(model, runs[:2], runs[2:], plan=False)
