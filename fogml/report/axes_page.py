@@ -118,7 +118,7 @@ def _acceptance(told: Mapping[str, Any]) -> tuple[str, ...]:
     limited = [row for row in told["rows"] if row["limit"] is not None]
     return (
         f"{len(tested)} of {len(told['rows'])}",
-        f"{sum(row['met'] is True for row in limited)} of {len(limited)}",
+        f"{sum(row['met'] is True for row in limited)} of {len(limited)}" if limited else MISSING,
         "; ".join(missed) or MISSING,
         "; ".join(told["reasons"]),
     )

@@ -188,14 +188,18 @@ def test_in_a_narrow_window_tools_cover_no_legend_and_captions_stay_in_sight(bro
 def test_a_slider_moves_what_is_replayed(browser) -> None:
     opened = browser(every_page()["what if"])
     left = 'document.getElementById("left").textContent'
-    move = """(function () {
+    beside = 'document.getElementById(slider.id + "-told").textContent'
+    move = """(function (value, size) {
       var slider = document.querySelector(".sliders input");
-      slider.value = 0;
+      slider.dataset.size = size || slider.dataset.size;
+      slider.value = value;
       slider.dispatchEvent(new Event("input"));
       return %s;
-    })()"""
-    found, off = opened.tell(left), opened.tell(move % left)
+    })"""
+    found, off = opened.tell(left), opened.tell(f"{move % left}(0)")
+    told = opened.tell(f"{move % beside}(-1, 1.5e-8)")
     opened.close()
+    assert told.startswith("−1 × = −1.5 × 10⁻⁸ ")
     # The loop of 0.05 deg/h, 0.035 rms, is back in the gap; the noise of the floor is in both.
     assert re.match(r"Gap 0\.007\d* deg/h rms", found) and re.match(r"Gap 0\.03[56]\d* deg/h rms", off)
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from fogml import numerals as words
 from fogml.pictures import braille, ticks
+from fogml.report.axes_page import _acceptance
 from fogml.report.blind_tables import figure_text, open_set_plot, spanned
 from fogml.report.monitor_words import _days
 from fogml.report.page import _breakable
@@ -188,3 +189,8 @@ def test_a_share_just_short_of_what_is_wanted_is_seen_to_be_short() -> None:
         "90.0 %",
         "–",
     ]
+
+
+def test_without_limits_none_are_counted() -> None:
+    row = {"tested": True, "met": None, "limit": None, "name": "Bias"}
+    assert _acceptance({"rows": [row], "reasons": []})[:2] == ("1 of 1", "–")

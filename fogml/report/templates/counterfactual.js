@@ -20,7 +20,11 @@
   });
 
   function number(value) {
-    return Number(value.toPrecision(3)).toString();
+    var parts = Number(value.toPrecision(3)).toString().split("e");
+    var power = (parts[1] || "").replace("+", "").replace("-", "⁻").replace(/\d/g, function (digit) {
+      return "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit];
+    });
+    return parts[0].replace("-", "−") + (power && " × 10" + power);
   }
 
   function show(whole) {
