@@ -62,6 +62,8 @@ def _page_text(folder: Path, name: str, made: Mapping[str, str] | None = None) -
         raise InputError(f"no page '{name}'; {known_are(name, names, 'pages')}")
     written = (folder / f"{name}.md").read_text(encoding="utf-8")
     plain = re.sub(r"^```\{[a-z-]+\}.*?^```\n", "", written, flags=re.MULTILINE | re.DOTALL)
+    # Comments mark the tables that experiments write.
+    plain = re.sub(r"^<!--.*?-->\n", "", plain, flags=re.MULTILINE | re.DOTALL)
     return plain + (made or {}).get(name, "")
 
 

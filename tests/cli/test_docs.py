@@ -63,7 +63,7 @@ def test_writes_one_page_that_is_complete_in_itself(invoke, tmp_path: Path) -> N
     assert len(within) > 60 and set(within) <= set(page.ids)
     assert len(page.ids) == len(set(page.ids))
     assert page.sources and all(source.startswith("data:image/") for source in page.sources)
-    assert page.elements.count("math") > 20 and "```" not in text
+    assert page.elements.count("math") > 20 and "```" not in text and "&lt;!--" not in text
     assert "script" not in page.elements and "link" not in page.elements
     assert not [link for link in page.links if not link.startswith(("#", "https://"))]
 
