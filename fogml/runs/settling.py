@@ -106,7 +106,9 @@ def unsettled_rows(
     begins, ends = lasting[1:], lasting[:-1]
     settling, leaving = 0, 0
     for _ in range(2):
-        kept = np.minimum(np.append(end[:-1] - leaving, end[-1])[1:], begin[1:] + reach[0])
+        # Where none is late, all of a plateau tells how it settles.
+        late = leaving if leaving > first[1] else 0
+        kept = np.minimum(np.append(end[:-1] - late, end[-1])[1:], begin[1:] + reach[0])
         settling = settling_rows(
             output, begin[1:][begins], kept[begins], heights[begins], first[0], share=share[0]
         )

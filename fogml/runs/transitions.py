@@ -191,7 +191,8 @@ def _gyro_settling_s(run: Run, changes: _Changes, settled_share: float = 0.02, n
     edges = np.concatenate([[0], changes.start, [len(run)]])
     plateaus, steps, turns = [], [], []
     for before, start, begin, stop in zip(edges[:-2], edges[1:-1], changes.stop, edges[2:], strict=True):
-        limit = np.searchsorted(run.time, run.time[begin] + LONGEST_TRANSITION_S)
+        # The longest transition ends in the first half.
+        limit = np.searchsorted(run.time, run.time[begin] + 2.0 * LONGEST_TRANSITION_S)
         plateau = slice(int(begin), min(int(stop), int(limit)))
         length = plateau.stop - plateau.start
         if length < LEAST_ROWS:
@@ -231,13 +232,14 @@ def _unsettled_s(
     begins[turns] = changes.stop
     edges = np.append(0, begins), np.append(ends, len(run))
     first = max(1, round(least_s / run.sample_s))
-    reach = max(round(LONGEST_TRANSITION_S / run.sample_s), LEAST_ROWS)
+    reach = max(round(LONGEST_TRANSITION_S / run.sample_s), LEAST_ROWS, 4 * first)
     levels = _middles(run.gyro, *edges, reach)
     heights = np.where(turns, levels[1:, 0] - levels[:-1, 1], 0.0)
     share = (SHARE, _LATE_SHARE)
     settled, left = unsettled_rows(run.gyro, *edges, heights, (first, first), (reach, reach), share)
     plateaus = np.minimum(np.append(changes.start[1:], len(run)) - changes.stop, reach)
-    longest = 0.5 * float(min(plateaus[plateaus >= 4 * first], default=0)) * run.sample_s
+    # Where none is so long, that which tells it best.
+    longest = 0.5 * float(min(plateaus[plateaus >= 4 * first], default=plateaus.max())) * run.sample_s
     settled_s = least_s if settled <= first else max(least_s, min(settled * run.sample_s, longest))
     # What another rate has made is told by no part of a plateau, however short: it may be lost altogether.
     return settled_s, max(least_s, left * run.sample_s)

@@ -184,3 +184,22 @@ def test_ramps_of_a_slow_table_leave_all_rates():
     rates = np.unique(levels)
     assert found.nonlinearity == pytest.approx(closed_form(rates, rates + cubic * rates**3), rel=1e-3)
     assert found.asymmetry == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_slow_table_whose_ramps_are_not_recorded_moves_no_scale_factor():
+    """Commands at once, a table that takes 40 s between them at 5 deg/s2, and a gyro that lags by 2 s."""
+    command = np.repeat([0.0, *[100.0, -100.0, 0.0] * 6], 120)
+    table = command.copy()
+    for row in range(1, len(table)):
+        table[row] = table[row - 1] + np.clip(command[row] - table[row - 1], -5.0, 5.0)
+    gyro = table.copy()
+    for row in range(1, len(gyro)):
+        gyro[row] += (gyro[row - 1] - gyro[row]) * np.exp(-0.5)
+    noise = 0.2 * np.random.default_rng(1).standard_normal(len(gyro))
+    run = Run.from_columns(
+        time=np.arange(len(table)), gyro=DEG_H * 1.00005 * gyro + noise, rate=command, T=25.0 + 0.0 * table
+    )
+    steps = find_steps(run, np.ones(len(run), dtype=bool))
+    assert steps is not None
+    found = scale_factor_error(steps, run.gyro - DEG_H * command)
+    assert found.overall == pytest.approx(50.0, abs=0.5)
