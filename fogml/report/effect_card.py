@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fogml.arrays import FloatArray
-from fogml.numerals import number
+from fogml.numerals import MISSING, number, unit_words
 from fogml.pictures import Curve, line_figure
 from fogml.report import style
 from fogml.report.page import render
@@ -59,7 +59,7 @@ def effect_page(
         about=about(card),
         curves=[rate_figure(curve) for curve in curves],
         allan=allan_figure(allan),
-        warm=f"{RATE_DEGC:g} degC",
+        warm=f"{RATE_DEGC:g} °C",
     )
 
 
@@ -96,7 +96,7 @@ def quantities_table(card: Mapping[str, Any]) -> Table:
         (
             quantity["name"].replace("_", " "),
             quantity["meaning"],
-            quantity["unit"],
+            unit_words(quantity["unit"]) or MISSING,
             _range(quantity, "tactical"),
             _range(quantity, "navigation"),
         )
@@ -128,10 +128,10 @@ def words(card: Mapping[str, Any], picture: Picture) -> str:
     if not _shows(picture):
         return "Nothing of it shows in the output here."
     low, high = picture.span
-    unit = card["amplitude"]["unit"]
-    amplitude = number(card["amplitude"]["usual"]) + ("" if unit == "1" else f" {unit}")
+    amplitude = f"{number(card['amplitude']['usual'])} {unit_words(card['amplitude']['unit'])}".rstrip()
     what = " in the temperatures" if picture.places else ""
-    return f"From {number(low)} to {number(high)} {picture.unit}{what} at an amplitude of {amplitude}."
+    span = f"From {number(low)} to {number(high)} {unit_words(picture.unit)}"
+    return f"{span}{what} at an amplitude of {amplitude}."
 
 
 def _across(picture: Picture) -> tuple[FloatArray, str]:
@@ -144,7 +144,7 @@ def _chamber(picture: Picture) -> Markup:
     across, title = _across(picture)
     curves = [_reduced(across, picture.chamber, style.TRAINING)]
     alt = f"Chamber air over time on {picture.programme}"
-    return line_figure(curves, title, "chamber [degC]", alt, height=120)
+    return line_figure(curves, title, "chamber [°C]", alt, height=120)
 
 
 def _signature(picture: Picture) -> Markup:
@@ -158,7 +158,7 @@ def _signature(picture: Picture) -> Markup:
     if picture.places:
         for colour, (name, change) in zip(style.SERIES, picture.places.items()):
             curves.append(_reduced(across, change, colour, name))
-        return line_figure(curves, title, "change [degC]", alt, height=200)
+        return line_figure(curves, title, "change [°C]", alt, height=200)
     curves.append(_reduced(across, picture.values, style.MODEL))
     return line_figure(curves, title, "effect [deg/h]", alt, height=170)
 
@@ -218,5 +218,5 @@ def catalogue_page(cards: Sequence[Drawn]) -> str:
         }
         stages[card["stage"]].append(entry)
     shown = [(STAGE_WORDS[stage], entries) for stage, entries in stages.items() if entries]
-    warm = f"{RATE_DEGC:g} degC"
+    warm = f"{RATE_DEGC:g} °C"
     return render("catalogue.html", title="Catalogue of effects", count=len(cards), stages=shown, warm=warm)

@@ -16,10 +16,13 @@ from fogml import numerals as words
 from fogml.pictures import braille, ticks
 from fogml.report.axes_page import _acceptance
 from fogml.report.blind_tables import figure_text, open_set_plot, spanned
+from fogml.report.effect_card import quantities_table
 from fogml.report.monitor_words import _days
 from fogml.report.page import _breakable
 from fogml.report.style import log_axis, rounded_up, time_unit
 from fogml.report.tables import Table, coefficients_table
+from fogml.twin.pictures import card_values
+from fogml.twin.registry import effect
 
 
 @pytest.mark.parametrize(
@@ -194,3 +197,8 @@ def test_a_share_just_short_of_what_is_wanted_is_seen_to_be_short() -> None:
 def test_without_limits_none_are_counted() -> None:
     row = {"tested": True, "met": None, "limit": None, "name": "Bias"}
     assert _acceptance({"rows": [row], "reasons": []})[:2] == ("1 of 1", "–")
+
+
+def test_a_card_s_page_writes_units_as_other_pages_do() -> None:
+    table = quantities_table(card_values(effect("thermal_hysteresis")))
+    assert [row.cells[2] for row in table.rows] == ["deg/h", "°C"]
