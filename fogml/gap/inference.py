@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.gap.catalogue import families_of
 from fogml.gap.field import Columns, Field, Member
@@ -27,6 +28,7 @@ from fogml.numerals import short
 from fogml.runs.checks import refuse_dead
 from fogml.runs.run import Run
 from fogml.runs.turning import turning
+from fogml.signals.large import empty
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin import Twin
 
@@ -135,6 +137,16 @@ class Inference:
         search.field = held
         return replace(self, setting=held.setting, search=search)
 
+    def put_away(self) -> Inference:
+        """The same with all columns in temporary files, for when it is one of many."""
+        for key in [key for key in self.scene.cache if key[0] == "loops"]:
+            del self.scene.cache[key]  # of which the columns are made
+        columns = replace(self.columns, by_run=tuple(map(_put_away, self.columns.by_run)))
+        search, held = copy(self.search), copy(self.field)
+        held.columns, held.white = columns, _put_away(held.white)
+        search.field, search.cached_rows = held, {}
+        return replace(self, columns=columns, search=search)
+
     def kind(self, member: Member) -> str:
         """Kind of a member's family."""
         return self.columns.families[member.family].kind
@@ -241,6 +253,13 @@ def foreseen(model: TwinModel, runs: Sequence[Run], noise: NoiseModel, priors: P
     setting = setting_of(model, model.twin, scene, priors, noise)
     columns = Columns.of(families_of(model.twin, scene), scene, setting.values)
     return Search(Field(setting, columns, noise))
+
+
+def _put_away(values: FloatArray) -> FloatArray:
+    """A copy in a file of no name, whose memory `fogml.signals.large.release` lets go of."""
+    away = empty(values.size, held=0)
+    away[:] = values.ravel()
+    return np.asarray(away.reshape(values.shape))
 
 
 def _nodes(explanations: Sequence[Explanation]) -> list[int]:

@@ -80,7 +80,7 @@ class Search:
         self.priors = held.setting.priors
         self.families = held.columns.families
         self.log_odds = self._log_odds()
-        self._rows: dict[int, FloatArray] = {}
+        self.cached_rows: dict[int, FloatArray] = {}
         self._across = held.base.basis.T @ held.white
         self._fits = self._fits_to(held.base.data)
         self.blocks = Blocks(held, self._across)
@@ -276,10 +276,10 @@ class Search:
 
     def _row(self, node: int) -> FloatArray:
         """Inner products of a node's columns with all columns beside the constants, shape (k, columns)."""
-        if node not in self._rows:
+        if node not in self.cached_rows:
             own = self.field.block(node).T @ self.field.white
-            self._rows[node] = own - self._across[:, self.field.at[node]].T @ self._across
-        return self._rows[node]
+            self.cached_rows[node] = own - self._across[:, self.field.at[node]].T @ self._across
+        return self.cached_rows[node]
 
     def _held(self, members: Sequence[Member]) -> _Held:
         """The data beside constants and members, by inner products alone."""

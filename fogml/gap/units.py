@@ -28,6 +28,7 @@ from fogml.gap.settings import Priors
 from fogml.numerals import probability_words, short, with_error
 from fogml.runs.run import Run
 from fogml.settings_check import check_whole
+from fogml.signals.large import release
 from fogml.signals.restricted import next_value, random_effects
 from fogml.twin.twin import Twin
 
@@ -136,7 +137,9 @@ def diagnose_units(
     for unit, runs in units.items():
         quiet = static[unit][0] if unit in static else None
         tell(f"unit {unit}")
-        found[unit] = inferred(model, runs, held.get(unit, ()), quiet, without, priors, tell)
+        own = inferred(model, runs, held.get(unit, ()), quiet, without, priors, tell)
+        found[unit] = own.put_away() if len(units) > 1 else own
+        release()
     told = {unit: _Told(f) for unit, f in found.items()}
     by_unit = {}
     for unit, f in found.items():
@@ -144,6 +147,7 @@ def diagnose_units(
         quiet = static[unit][0] if unit in static else None
         shared = replace(f, shared=_by_others(others, told[unit]))
         by_unit[unit] = answered(shared, quiet, unit not in held, seed, cost_of_false_name)
+        release()
     return UnitsDiagnosis(by_unit, _shared(by_unit, list(told.values())))
 
 
@@ -187,6 +191,7 @@ class _Told:
             held = [e for e in self.found.explanations if self.names(e) == shown]
             if not held:
                 held = [self._grown(shown)]
+                release()
             own = self.found.search.log_odds
             prior = sum(float(own[self.families[id]]) for id in shown)
             self._scores[shown] = float(np.logaddexp.reduce([e.score - prior for e in held]))

@@ -23,6 +23,7 @@ from fogml.gap.scene import Scene
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.unknown import unknown_families
 from fogml.signals.bases import decayed
+from fogml.signals.large import release
 from fogml.twin.twin_file import load_twin
 from tests.gap.test_answer import _run
 
@@ -349,3 +350,18 @@ def test_a_rehearsal_names_beside_something_unknown_that_holds_more():
     assert likeliest == [0] and probability > 0.8
     assert ahead._most_likely(search, pairs, 1e6)[1] < 0.5
     assert ahead._most_likely(search, {frozenset(): 0.0, frozenset({2}): 5.0}, 1.0) == ([], 0.0)
+
+
+def test_what_is_put_away_finds_the_same(found):
+    """Of several units the columns lie in files."""
+    away = found.put_away()
+    assert not away.search.cached_rows and away.search.field.white is not found.search.field.white
+    assert np.array_equal(away.search.field.white, found.search.field.white)
+    assert all(map(np.array_equal, away.columns.by_run, found.columns.by_run))
+    release()
+    best = found.explanations[0]
+    members = found.search.best_members(best.members)
+    assert away.search.best_members(best.members) == members
+    assert Foretold.of(away, best.members).on(0) == pytest.approx(
+        Foretold.of(found, best.members).on(0), rel=1e-12
+    )
