@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import re
+import stat
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
@@ -41,8 +42,11 @@ def read_json(path: Path, remedy: str, most_bytes: int = MOST_BYTES) -> Any:
 
 
 def read_bytes(path: Path, remedy: str, most_bytes: int = MOST_BYTES) -> bytes:
-    """The bytes of a file of bounded size."""
+    """The bytes of a file of bounded size; a pipe in its place could be waited for without end."""
     try:
+        kind = path.stat().st_mode
+        if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
+            raise InputError(f"{path}: is no ordinary file; {remedy}")
         with path.open("rb") as file:
             data = file.read(most_bytes + 1)
     except (FileNotFoundError, NotADirectoryError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import pytest
 from hypothesis import given, settings
@@ -79,10 +80,19 @@ def test_files(tmp_path):
         read_json(tmp_path, "make it")
 
 
+def test_a_pipe_or_a_device_in_the_place_of_a_file_is_refused(tmp_path):
+    """As a folder from a stranger may hold: reading it would wait, or go on, without end."""
+    os.mkfifo(tmp_path / "model.json")
+    (tmp_path / "outcome.json").symlink_to("/dev/zero")
+    for name in ("model.json", "outcome.json"):
+        with pytest.raises(InputError, match=rf"{name}: is no ordinary file; train again"):
+            read_json(tmp_path / name, "train again")
+
+
 def test_a_schema_is_asked_for():
     assert json_object({"schema": "a/1"}, "x", "a/1", "") == {"schema": "a/1"}
     for value in ([], None, {}, {"schema": "a/2"}, {"schema": ["a/1"]}):
-        with pytest.raises(InputError, match="expected 'a/1'"):
+        with pytest.raises(InputError, match=r"(expected|this one reads) 'a/1'"):
             json_object(value, "x", "a/1", "")
 
 

@@ -133,6 +133,8 @@ class FolderStore(Store):
 
         if not self._file.exists():
             return []
+        if not self._file.is_file():
+            raise InputError(f"{self._file}: is no ordinary file; choose another --store")
         with stored_file(self._file, "parquet", ("schema",), DEFAULT_LIMITS) as stored:
             arrays = {array.name: array for array in stored.arrays}
             if missing := [name for name in (*TEXTS, *NUMBERS) if name not in arrays]:

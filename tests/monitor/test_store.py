@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import replace
@@ -192,3 +193,9 @@ def test_what_is_no_store_is_said_at_once(tmp_path):
         open_store(str(tmp_path / "file"))
     with pytest.raises(InputError, match="--store"):
         open_store("nosuchdatabase://x/y").records()
+
+
+def test_a_pipe_in_the_place_of_the_store_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "runs.parquet")
+    with pytest.raises(InputError, match=r"runs\.parquet: is no ordinary file; choose another --store"):
+        open_store(str(tmp_path)).records()

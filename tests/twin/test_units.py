@@ -127,7 +127,7 @@ def test_type_and_laboratory_stay(units):
 
 
 def test_at_least_one():
-    with pytest.raises(InputError, match="units: 0"):
+    with pytest.raises(InputError, match="'count' is 0"):
         draw_units(Twin(), 0)
     with pytest.raises(InputError, match="'repeats' is 0"):
         repeat_unit(replace(Twin(), name="x"), 0)
