@@ -159,7 +159,7 @@ def test_a_constant_far_off_is_said_and_fitted_all_the_same():
     found = SimpleNamespace(setting=setting, points=SimpleNamespace(source="-"))
     far = ConstantFit("b0", "deg/h", 0.0, 5.0, -40.0, 0.01)
     (said,) = [line for line in assumed(found, [far]) if "standard deviations off" in line]
-    assert said.startswith("b0 = -40") and "is 8 standard deviations off" in said
+    assert said.startswith("b0 = \N{MINUS SIGN}40") and "is 8 standard deviations off" in said
     # What was far off until a cause was found is not.
     assert "standard deviations off" not in " ".join(assumed(found, [replace(far, value=1.0)]))
 
