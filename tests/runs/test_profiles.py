@@ -281,7 +281,7 @@ def test_a_faulty_profile_names_file_and_key(write, change, message):
         ("  T:", "  temperature:", r"columns.temperature': not a column of the run format"),
         ("  gyro: {source: rate, unit: deg/s}\n", "", r"always needs 'gyro'"),
         ("source: temp, ", "", r"columns.T.source': missing"),
-        ("schema: fogml.import/1", "schema: fogml.import/9", r"key 'schema'"),
+        ("schema: fogml.import/1", "schema: fogml.import/9", "of a newer fogml"),
         ("description: a logger of one's own\n", "", r"key 'description' is missing"),
     ],
 )
