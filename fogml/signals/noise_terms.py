@@ -171,7 +171,8 @@ def noise_terms(
         low, high = term_interval(search, name, level)
         fitted, lower, upper = (_SCALES[name] * float(np.sqrt(v)) for v in (search.best[name], low, high))
         terms[name] = NoiseTerm(fitted if fitted > 0 else None, lower, upper, _UNITS[name], fitted)
-    terms["R"] = _ramp(search, terms["K"], level, ramps)
+    lines = spectrum.columns.shape[1] if ramps is None else ramps  # the search appends what sinusoids make
+    terms["R"] = _ramp(search, terms["K"], level, lines)
     taus = allan.taus_s
     holds = _holds_from(search, taus)
     seen = (allan.adev > 0) & (taus >= max(holds, least_tau_s) * (1.0 - 1e-9))
@@ -215,7 +216,7 @@ def _holds_from(search: NoiseSearch, taus: FloatArray) -> float:
     return first
 
 
-def _ramp(search: NoiseSearch, walk: NoiseTerm, level: float, ramps: int | None) -> NoiseTerm:
+def _ramp(search: NoiseSearch, walk: NoiseTerm, level: float, ramps: int) -> NoiseTerm:
     """The ramp, where it is told from none and from a random walk."""
     from scipy.special import ndtri
 

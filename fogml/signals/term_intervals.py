@@ -220,7 +220,7 @@ def slow_fits(model: SpectrumModel, names: Sequence[str]) -> tuple[list[Spectrum
 
 
 def ramp(
-    search: NoiseSearch, walk_upper: float, removed: FloatArray, ramps: int | None, off: float
+    search: NoiseSearch, walk_upper: float, removed: FloatArray, ramps: int, off: float
 ) -> tuple[float, float, float] | None:
     """The ramp and the ends of its interval [deg/h/s], or None without one.
 
@@ -240,12 +240,12 @@ def ramp(
     removed
         What was taken off the constants before [deg/h/s].
     ramps
-        How many of the constants are ramps; all if None.
+        How many of the constants, the first ones, are ramps.
     off
         Standard errors from the ramp to either end.
     """
     best = search.best
-    count = len(best.constants) if ramps is None else min(ramps, len(best.constants))
+    count = min(ramps, len(best.constants))
     if count == 0:
         return None
     model, place = search.candidates[0].model, best.terms.names.index("K")
