@@ -232,9 +232,10 @@ def _print_tables(settings: ExportJobSettings, report: dict[str, Any], terminal:
         if "breakpoints" in told:
             rows.append(["breakpoints", f"{told['breakpoints']}, {told['bytes']} bytes"])
         if loss := told.get("accuracy"):
+            form = "table" if "breakpoints" in told else "cubic"
             text = (
                 f"{short(loss['rms_model'], 4)} deg/h with the model, "
-                f"{short(loss['rms_exported'], 4)} with the table"
+                f"{short(loss['rms_exported'], 4)} with the {form}"
             )
             rows.append([f"rms of {loss['averaging_s']:g} s averages on the training runs", text])
         if told["leaves_out"]:

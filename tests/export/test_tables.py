@@ -172,6 +172,23 @@ def test_a_drift_that_is_constant_has_parameters(tmp_path, to):
     assert told["coefficients"] == pytest.approx([0.0] * 4, abs=1e-12)
 
 
+@pytest.mark.parametrize("to", ["px4", "ardupilot", "segments"])
+def test_the_loss_holds_what_the_form_leaves_out(axes, tmp_path, to):
+    """Of 5 deg/h per degC/min on ramps of 2 degC/min a form without rates leaves 10 deg/h."""
+    time = np.arange(0.0, 7200.0, 2.0)
+    T = 80.0 - np.abs(2.0 * time / 60.0 - 120.0)
+    noise = 0.1 * np.random.default_rng(0).standard_normal(len(time))
+    gyro = 2.0 + 0.1 * T + 10.0 * np.sign(3600.0 - time) + noise
+    run = Run.from_columns("ramps", Facts(), time=time, gyro=gyro, T=T)
+    model = make_model("polynomial", features="T, dT[block, 16 s]").fit(run)
+    told = export_tables([model], tmp_path, TableSettings(to), [run])["axes"]["x"]
+    assert told["largest_difference_at_rest"] < 0.01
+    assert told["accuracy"]["rms_model"] < 1.0
+    assert told["accuracy"]["rms_exported"] == pytest.approx(10.0, rel=0.02)
+    with pytest.raises(InputError, match="not one of the runs that the model was trained on"):
+        export_tables([model], tmp_path, TableSettings(to), [axes["x"][1]])
+
+
 def test_the_loss_is_of_the_sensors_that_stand_for_the_coils_temperature(axes, tmp_path):
     """A run with two coil sensors has no column T: its table leaves what a run of their mean does."""
     _, run = axes["x"]
