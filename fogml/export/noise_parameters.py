@@ -17,6 +17,9 @@ from fogml.escaping import visible
 from fogml.json_files import json_text
 
 KALMAN_SCHEMA = "fogml.kalman/1"
+TOGETHER = (
+    "held or filtered samples go together: each varies by less than R, by which they count as white ones"
+)
 _RADIAN = math.pi / 180.0
 _HOUR_S = 3600.0
 
@@ -41,6 +44,8 @@ class NoiseParameters:
         How long it is [s].
     quantisation
         Quantisation noise Q of the angle [rad]; 0 where the run does not tell it.
+    together
+        Whether the output is held or filtered, so that its samples go together.
     bounds
         Terms of which the upper end of the interval is given, as the run does not tell them from nothing.
     """
@@ -52,6 +57,7 @@ class NoiseParameters:
     run: str
     span_s: float
     quantisation: float = 0.0
+    together: bool = False
     bounds: tuple[str, ...] = ()
 
 
@@ -93,6 +99,7 @@ def noise_parameters(noise: Mapping[str, Any]) -> NoiseParameters:
         run=str(noise["run"]),
         span_s=float(noise["span_s"]),
         quantisation=1e-6 * float(noise["terms"]["Q"]["value"] or 0.0),
+        together=bool(noise.get("hold") or noise.get("filter")),
         bounds=tuple(bounds),
     )
 
@@ -230,6 +237,7 @@ def _kalman(found: NoiseParameters) -> str:
         "Q_units": [["rad^2", "rad^2/s"], ["rad^2/s", "rad^2/s^2"]],
         "R": sample_variance(found),
         "R_unit": "rad^2/s^2, of one sample of the rate",
+        **({"R_note": TOGETHER} if found.together else {}),
         "N": {"value": found.white, "unit": "rad/s/sqrt(Hz)"},
         "K": {"value": found.walk, "unit": "rad/s^2/sqrt(Hz)"},
         "upper_ends": list(found.bounds),

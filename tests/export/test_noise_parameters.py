@@ -117,3 +117,9 @@ def test_a_samples_variance_holds_quantisation():
     angle = q * np.sqrt(12.0) * rng.uniform(-0.5, 0.5, 200001)
     white = np.radians(N) / 60.0 / np.sqrt(interval) * rng.standard_normal(200000)
     assert held["R"] == pytest.approx(np.var(np.diff(angle) / interval + white), rel=0.01)
+
+
+@pytest.mark.parametrize("how", [{"hold": {"samples": 10.0}}, {"filter": {"kind": "butterworth"}}, {}])
+def test_samples_that_go_together_are_told(how):
+    held = json.loads(noise_text(noise() | {"hold": None, "filter": None} | how, "kalman")[1])
+    assert ("R_note" in held) == bool(how)
