@@ -16,7 +16,7 @@ from fogml.cli.terminal import Terminal
 from fogml.cli.twin_commands import ReplaySettings, SimulateSettings
 from fogml.errors import InputError
 from fogml.json_files import check_finite
-from fogml.numerals import duration, number
+from fogml.numerals import duration, number, plural
 from fogml.outputs import check_room
 from fogml.runs.columns import REPLAYED
 from fogml.runs.facts import facts_from
@@ -197,10 +197,15 @@ def _print_simulation(settings: SimulateSettings, world: World, rows: int, termi
 
 
 def _say_silent(world: World, terminal: Terminal) -> None:
-    """Name the effects that are on and that this programme gives nothing to act on."""
+    """Name the effects that this programme gives nothing to act on, and rates that samples may miss."""
+    name = world.timeline.programme.name
     if world.silent:
-        name = world.timeline.programme.name
         terminal.say(f"On, but without any part in the output of {name}: {', '.join(world.silent)}.")
+    if rates := world.timeline.short_rates:
+        terminal.say(
+            f"{name}: {plural(rates, 'rate')} of the table held for less than a sample of "
+            f"{world.timeline.sample_s:g} s; gyro and rate are those at the samples, which may miss them."
+        )
 
 
 def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:

@@ -118,6 +118,13 @@ class Timeline:
             return first, second, third, fourth
         return knots
 
+    @property
+    def short_rates(self) -> int:
+        """Rates that the table holds for less than a sample, so that no sample may show them."""
+        times, rates, _, _ = self.table_knots
+        held = (rates[1:] == rates[:-1]) & (rates[1:] != 0.0)
+        return int(np.count_nonzero(held & (np.diff(times) < self.sample_s)))
+
     def block(self, start: int, stop: int) -> TimelineBlock:
         """The samples from `start` to before `stop`."""
         time = np.arange(start, min(stop, len(self)), dtype=np.float64) * self.sample_s

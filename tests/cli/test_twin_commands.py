@@ -77,6 +77,16 @@ def test_effects_that_changed_nothing_are_told(tmp_path, invoke, invoke_json, tr
     assert "On, but without any part in the output" in invoke(*command).stdout
 
 
+def test_rates_that_samples_may_miss_are_told(tmp_path, invoke):
+    config = tmp_path / "simulation.yaml"
+    steps = [{"soak at 25 degC for 1 h": ["turn at 5 deg/s for 60 s from minute 5"]}]
+    config.write_text(yaml.safe_dump({"schema": "fogml.simulate/1", "programme": steps}))
+    told = [
+        invoke("simulate", config, "-o", tmp_path / "run.csv", "--sample", s).stdout for s in ("1", "100")
+    ]
+    assert ["1 rate of the table held for less than a sample of 100 s" in t for t in told] == [False, True]
+
+
 @pytest.mark.parametrize("suffixes", [(".csv", ".parquet"), (".parquet", ".csv")])
 def test_a_truth_of_the_run_s_stem_leaves_its_facts(config, tmp_path, invoke, suffixes):
     out, truth = (tmp_path / f"run{suffix}" for suffix in suffixes)

@@ -234,3 +234,14 @@ def test_a_block_of_a_long_programme_looks_at_what_reaches_into_it() -> None:
     assert np.ptp(block.table_rate) > 6.0
     pieces, samples = block._samples_of(timeline.set_point_knots[0])
     assert pieces.stop - pieces.start < 12 and samples.sum() == 300
+
+
+@pytest.mark.parametrize(("sample_s", "missed"), [(1.0, 0), (50.0, 1), (100.0, 2), (200.0, 3)])
+def test_rates_that_samples_may_miss_are_counted(sample_s: float, missed: int) -> None:
+    """Rates held for 40, 80 and 120 s; what takes the table there and back comes on top."""
+    steps = [
+        {"soak at 25 degC for 1 h": ["turn at 5 deg/s for 40 s, then -5 deg/s for 80 s, from minute 5",
+                                     "turn at 10 deg/s for 120 s from minute 20"]},
+    ]  # fmt: skip
+    assert on_clock(steps, sample_s, table_acceleration="100 deg/s2").short_rates == missed
+    assert on_clock(["soak at 25 degC for 1 h"], sample_s).short_rates == 0
