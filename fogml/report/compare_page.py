@@ -14,7 +14,7 @@ from fogml.report import style
 from fogml.report.page import Drawing, render
 from fogml.report.style import log_axis, segments_of, shade, time_unit
 from fogml.report.tables import Row, Table, columns_of
-from fogml.report.verdict import floor_told, own_noise, stated_limits, unseen, worst_run
+from fogml.report.verdict import floor_told, own_noise, seen_told, stated_limits, unseen, worst_run
 from fogml.signals.drawn import drawn, gap_starts
 from fogml.validation.advice import output_reasons
 from fogml.validation.results import Judgement, RunJudgement
@@ -92,7 +92,7 @@ def _verdict(judgements: Mapping[str, Judgement], order: list[str]) -> list[str]
 
 def doubts_of(judgement: Judgement) -> list[str]:
     """What makes the figures of every model doubtful, in sentences."""
-    return list(dict.fromkeys(one.sentence for one in output_reasons(judgement)))
+    return [*dict.fromkeys(one.sentence for one in output_reasons(judgement)), *seen_told(judgement)]
 
 
 def _chosen(judgements: Mapping[str, Judgement]) -> str:

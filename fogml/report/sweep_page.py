@@ -14,7 +14,7 @@ from fogml.report import figures_judgement, style
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.style import log_axis
 from fogml.report.tables import Row, Table, metrics_table
-from fogml.report.verdict import worst_run
+from fogml.report.verdict import seen_told, worst_run
 from fogml.tuning.winner import DEFAULT
 from fogml.validation.results import Judgement
 
@@ -203,7 +203,7 @@ def verdict_sentences(study: Mapping[str, Any], judgement: Judgement | None) -> 
         f"Judged once, on {worst.run}, it leaves {number(worst.after.rms)} of {number(worst.before.rms)} "
         f"deg/h rms ({averages(worst.averaging_s)}); the noise floor is {number(worst.floor)} deg/h."
     )
-    return sentences
+    return [*sentences, *seen_told(judgement)]
 
 
 def _tiles(study: Mapping[str, Any], judgement: Judgement | None) -> list[Tile]:

@@ -64,7 +64,7 @@ def verdict(judgement: Judgement) -> list[str]:
     return [
         *(_still(judgement) if still else _what_is_left(judgement, worst)),
         *([] if still else _bias(worst)),
-        *_seen(judgement),
+        *seen_told(judgement),
         *_limits(stated_limits(judgement)),
         *_outside(judgement.test),
     ]
@@ -155,7 +155,8 @@ def _bias(worst: RunJudgement) -> list[str]:
     ]
 
 
-def _seen(judgement: Judgement) -> list[str]:
+def seen_told(judgement: Judgement) -> list[str]:
+    """That a test run holds the samples of a training run, as a sentence; none where none does."""
     if unseen(judgement):
         return []
     return [

@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 
 from fogml.report.certificate import by_unit, certificate
+from fogml.report.compare_page import compare_page
+from fogml.report.sweep_page import verdict_sentences as sweep_sentences
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
 from fogml.validation.certified import at_constant_temperature, sample_deviation, set_up, with_uncertainty
 from tests.report.judgements import judged_run, judgement
 from tests.report.pages import Page
+from tests.report.procedure_pages import written
 
 
 def two_units() -> object:
@@ -76,6 +79,17 @@ def test_runs_seen_in_training_are_not_called_unseen() -> None:
     assert "on runs that the model has not seen" in Page(certificate(judgement())).text
     text = Page(certificate(judgement(findings=(seen,)))).text
     assert "has not seen" not in text and "on runs that hold training samples" in text
+
+
+def test_a_comparison_and_a_sweep_say_that_a_test_run_was_trained_on() -> None:
+    seen = Finding("seen_in_training", "holds samples of (about 50 %) training run a.csv")
+    for findings in ((), (seen,)):
+        judged = judgement(findings=findings)
+        for text in (
+            Page(compare_page({"rbf": judged})).text,
+            " ".join(sweep_sentences(written("sweep"), judged)),
+        ):
+            assert ("the figures say how well the model fits" in text) == bool(findings)
 
 
 def test_limits_that_are_met_by_a_model_not_to_be_used_do_not_stand_alone() -> None:
