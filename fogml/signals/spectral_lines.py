@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -58,17 +57,12 @@ def lines_of(
     freedom = median_freedom()
     masked: BoolArray | None = None
     lines: list[SpectralLine] = []
-    for low, high in pairwise(edges.tolist()):
-        if high <= low:
-            continue
+    for low, high in _wide(edges.tolist(), fewest):
         part = square[low:high]
-        top = int(np.argmax(part))
-        peak = float(part[top])
-        # A median of few, or of one side of a line, says nothing.
-        about = part if high - low >= fewest else square[max(low + top - near, 0) : low + top + near + 1]
-        if len(about) < fewest or peak <= limit * float(about.mean()) * 0.1:
+        peak = float(part.max())
+        if peak <= limit * float(part.mean()) * 0.1:
             continue
-        level = float(np.median(about)) / typical
+        level = float(np.median(part)) / typical
         if level <= 0.0 or peak <= limit * level:
             continue
         if masked is None:
@@ -94,6 +88,17 @@ def lines_of(
             frequency = (offset + middle) / (2.0 * n * sample_s)
             lines.append(SpectralLine(frequency, float(np.sqrt(max(energy.sum(), 0.0) / (sample_s * n)))))
     return masked, lines
+
+
+def _wide(edges: Sequence[int], fewest: int) -> Iterator[tuple[int, int]]:
+    """Bins, joined where they are of too few coefficients: a median of few says nothing."""
+    low = edges[0]
+    for high in edges[1:]:
+        if high - low >= fewest:
+            yield low, high
+            low = high
+    if low < edges[-1]:
+        yield max(edges[-1] - fewest, edges[0]), edges[-1]
 
 
 def median_freedom() -> float:

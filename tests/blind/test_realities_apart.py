@@ -13,7 +13,11 @@ from fogml.blind.plan import REALITIES
 FOLDER = Path(blind.__file__).parent
 HOME = "fogml.blind"
 TYPES = "fogml.arrays"
-MAY = (HOME, TYPES, *(f"fogml.{name}" for name in ("runs", "outputs", "processes", "errors", "json_files")))
+MAY = (
+    HOME,
+    TYPES,
+    *(f"fogml.{name}" for name in ("runs", "outputs", "processes", "errors", "json_files", "settings_check")),
+)
 
 
 def imported(path: Path) -> set[str]:
