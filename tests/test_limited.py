@@ -41,6 +41,16 @@ def test_each_limit_is_told(limits, code, told):
         run_limited([*PYTHON, code], limits)
 
 
+def test_a_system_that_tells_no_end_of_a_process_is_asked_for_it(monkeypatch):
+    def none(pid: int) -> int:
+        raise OSError("no such call, as before Linux 5.3")
+
+    monkeypatch.setattr(os, "pidfd_open", none)
+    assert run_limited([*PYTHON, "import sys; sys.exit(4)"], ProgramLimits()).status == 4
+    with pytest.raises(LimitExceededError, match=r"more than 0\.2 s"):
+        run_limited([*PYTHON, "import time; time.sleep(60)"], ProgramLimits(wall_s=0.2))
+
+
 def test_what_writes_too_much_is_ended_by_the_first_byte_beyond():
     with pytest.raises(LimitExceededError, match="wrote more than 1 MB"):
         run_limited(["head", "-c", str(2 << 20), "/dev/zero"], ProgramLimits(output_bytes=1 << 20))
