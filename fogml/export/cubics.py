@@ -109,6 +109,9 @@ def _px4(coefficients: Mapping[int, FloatArray], low: float, high: float, refere
     lines = [
         "# Gyro rate offsets over temperature, written by fogml.",
         "# Set TC_G0_ID to the device id of the sensor (CAL_GYRO0_ID) before TC_G_ENABLE takes effect.",
+        "# X0 is the whole offset; an offset of a calibration is taken off beside it: set "
+        + ", ".join(f"CAL_GYRO0_{'XYZ'[axis]}OFF" for axis in coefficients)
+        + " to 0.",
         "# Vehicle-Id Component-Id Name Value Type",
         f"1\t1\tTC_G_ENABLE\t1\t{_MAV_INT}",
         *(f"1\t1\t{name}\t{np.float32(value):.9g}\t{_MAV_FLOAT}" for name, value in floats.items()),
