@@ -209,9 +209,10 @@ class Jobs:
 
         Looked for once: pages ask each second, and a fleet's results are thousands of folders.
         """
-        ended = {name: self.state(name) not in ("waiting", "running") for name in self.names()}
         found = []
-        for name in reversed([name for name, has in ended.items() if has]):
+        for name in reversed(self.names()):
+            if self.state(name) in ("waiting", "running"):
+                continue
             job = (self.folder / name / "job.json").stat()
             key = name, job.st_ino, job.st_mtime_ns, pattern
             if key not in self._written:

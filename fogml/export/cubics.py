@@ -25,7 +25,7 @@ _NUMBERS = {"x": 0, "y": 1, "z": 2}
 
 
 def write_cubics(
-    folder: Path, to: str, curves: Mapping[str, StaticCurve], cards: Mapping[str, Mapping[str, Any]]
+    folder: Path, to: str, curves: Mapping[str, StaticCurve]
 ) -> tuple[dict[str, dict[str, Any]], dict[str, float], dict[str, Callable[[FloatArray], FloatArray]]]:
     """Write a parameter file, and tell of each axis its coefficients and errors.
 
@@ -37,8 +37,6 @@ def write_cubics(
         ``px4`` or ``ardupilot``.
     curves
         By axis: the model at rest.
-    cards
-        By axis: what the model is.
 
     Returns
     -------

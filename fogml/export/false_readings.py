@@ -12,7 +12,7 @@ from fogml.export.plan import Plan
 from fogml.export.points import box_points
 from fogml.features.atoms import RATE_UNIT_S, Atom
 from fogml.features.own import Recursion
-from fogml.numerals import ascii_number as short
+from fogml.numerals import ascii_number
 from fogml.runs.columns import is_temperature
 
 SECONDS = (0.0, 60.0, 300.0)
@@ -106,18 +106,19 @@ def false_reading_lines(told: dict[str, Any] | None) -> list[str]:
         return []
     first, *_, last = told["largest_error"]
     lines = [
-        f"readings      believed within {short(told['step_degC'])} degC and {short(told['rate_degC_s'])} "
-        "degC/s of the last good one;",
-        f"              a false one that passes is off by up to {short(first['off_degC'])} degC and "
+        f"readings      believed within {ascii_number(told['step_degC'])} degC and "
+        f"{ascii_number(told['rate_degC_s'])} degC/s of the last good one;",
+        f"              a false one that passes is off by up to {ascii_number(first['off_degC'])} degC and "
         "makes, at",
-        f"              flag 0, an error of up to {short(first['one_deg_h'])} deg/h, a spell of such "
-        f"{short(first['spell_deg_h'])} deg/h;",
-        f"              after {last['missing_s']:g} s without a good one {short(last['off_degC'])} degC, "
-        f"{short(last['one_deg_h'])} and {short(last['spell_deg_h'])} deg/h",
+        f"              flag 0, an error of up to {ascii_number(first['one_deg_h'])} deg/h, a spell of such "
+        f"{ascii_number(first['spell_deg_h'])} deg/h;",
+        f"              after {last['missing_s']:g} s without a good one "
+        f"{ascii_number(last['off_degC'])} degC, {ascii_number(last['one_deg_h'])} and "
+        f"{ascii_number(last['spell_deg_h'])} deg/h",
     ]
     if "turning_deg_s" in told:
         soon, late = (
-            f"{short(part['one_turning_deg_h'])} and {short(part['spell_turning_deg_h'])} deg/h"
+            f"{ascii_number(part['one_turning_deg_h'])} and {ascii_number(part['spell_turning_deg_h'])} deg/h"
             for part in (first, last)
         )
         lines.append(f"              at rest; turning at {told['turning_deg_s']:g} deg/s {soon}, then {late}")

@@ -109,7 +109,7 @@ def export_tables(
     else:
         if matrix is not None:
             raise InputError(f"--matrix: {settings.to} has parameters of its own for it; leave it out")
-        found, errors, cubics = write_cubics(folder, settings.to, curves, cards)
+        found, errors, cubics = write_cubics(folder, settings.to, curves)
         for axis, cubic in cubics.items():
             found[axis]["accuracy"] = _loss(
                 named[axis], plans[axis], curves[axis].thermometer, cubic, runs[axis]

@@ -92,14 +92,15 @@ class FolderStore(Store):
         return self.folder / FILE
 
     def add(self, records: Sequence[RunRecord]) -> int:
-        from fogml.runs.reading_limits import LONGEST_MARK
+        from fogml.runs.reading_limits import DEFAULT_LIMITS
 
+        most = DEFAULT_LIMITS.mark_characters
         for record in records:
             for name in TEXTS:
-                if len(getattr(record, name)) > LONGEST_MARK:
+                if len(getattr(record, name)) > most:
                     raise InputError(
                         f"{record.run}: '{name}' has {len(getattr(record, name))} characters; "
-                        f"a store keeps {LONGEST_MARK}"
+                        f"a store keeps {most}"
                     )
 
         def write() -> int:

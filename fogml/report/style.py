@@ -189,7 +189,7 @@ def styled(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
     A legend that reaches below the tools at the figure's upper right stands lower than these.
     """
     figure.update_layout(template=TEMPLATE, height=height, **layout)
-    figure.for_each_trace(lambda trace: trace.update(name=trace.name or ""))  # else it is called "trace 0"
+    figure.update_traces(name="", selector={"name": None})  # else it is called "trace 0"
     shown = [trace.name for trace in figure.data if trace.name and trace.showlegend is not False]
     if "margin" not in layout and sum(_LEGEND_ITEM + len(name) for name in shown) > _BESIDE_TOOLS:
         figure.update_layout(margin={"t": 68}, height=height + 34)

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError, printable
 from fogml.readers import extra_hint, reader_of
 from fogml.readers.stored import MOST_NAMES
-from fogml.runs.reading_limits import DEFAULT_LIMITS, LONGEST_MARK, ReadingLimits
+from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 
 __all__ = [
     "CHILD", "DEFAULT_LIMITS", "ReaderProcess", "ReadingLimits", "StoredArray", "StoredFile", "stored_file",
@@ -100,8 +100,8 @@ class StoredFile:
             If the file is damaged there.
         """
         codes = np.empty(max(array.shape), dtype=np.float64)
-        request = {"do": "marks", "array": array.index, "most": most, "longest": LONGEST_MARK}
-        names = self.ask(request, codes)["names"]
+        bounds = {"most": most, "longest": self.limits.mark_characters}
+        names = self.ask({"do": "marks", "array": array.index, **bounds}, codes)["names"]
         return np.array(names, dtype=np.str_)[codes.astype(np.intp)] if len(codes) else np.empty(0, np.str_)
 
     def text(self, array: StoredArray, block: int = 1 << 20) -> Iterator[bytes]:

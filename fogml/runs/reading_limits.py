@@ -8,9 +8,6 @@ from pathlib import Path
 from fogml.errors import InputError
 from fogml.numerals import short
 
-LONGEST_MARK = 1000
-"""Characters of a text in a column."""
-
 
 @dataclass(frozen=True)
 class ReadingLimits:
@@ -43,6 +40,8 @@ class ReadingLimits:
     repair_mb
         Largest file [MB] that `repair` takes, which holds it whole and several times over; of Parquet what
         its values take.
+    mark_characters
+        Of a text in a column, such as a unit's name or a mark: those of laboratories have some tens.
     """
 
     cpu_s: float = 10.0
@@ -54,6 +53,7 @@ class ReadingLimits:
     spare_mb: float = 16.0
     long_mb: float = 64.0
     repair_mb: float = 1000.0
+    mark_characters: int = 1000
 
     def at_least(self, cpu_s_per_mb: float, memory_per_byte: float) -> ReadingLimits:
         """The limits for a format that takes so much more than others."""

@@ -48,12 +48,16 @@ class Resolution:
     line_chance
         Chance of taking noise for a line, of the whole spectrum.
     line_fewest
-        Coefficients of a bin whose own median tells the noise about a line: that of fewer is known worse than
-        to 40 %, and their neighbours' is taken.
+        Coefficients whose median tells the noise about a line: that of fewer is known worse than to 40 %, so
+        that smaller bins are joined.
     line_near
         Coefficients on either side whose median a line's are compared with: few, as a density that is steep
         or has zeros is no line, and more than a line covers. Lines of the single coefficients are told from a
         model of the noise (`fogml.signals.slow_lines`).
+    line_widest
+        Single coefficients that hold most of a sinusoid whose cycles are no whole number of halves.
+    line_cycles
+        Cycles in a stretch from which on single coefficients make a sinusoid: fewer are told from no drift.
     collinear
         Share of the greatest singular value of the columns, each of length 1, from which a direction is told.
         Thermometers of one make whose readings agree to a few counts differ by more; what is below is the
@@ -66,6 +70,8 @@ class Resolution:
     line_chance: float = 1e-3
     line_fewest: int = 32
     line_near: int = 50
+    line_widest: int = 4
+    line_cycles: float = 2.0
     collinear: float = 1e-5
 
     def __post_init__(self) -> None:

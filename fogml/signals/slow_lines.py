@@ -18,10 +18,6 @@ from fogml.signals.noise_spectrum import Resolution, Spectrum
 from fogml.signals.spectral_lines import SpectralLine
 from fogml.signals.spectrum_fit import SpectrumFit
 
-LEAST_CYCLES = 2.0
-"""Cycles in a stretch that make a sinusoid: with fewer it is told from no drift."""
-_WIDEST = 4
-"""Coefficients that hold most of a sinusoid whose cycles are no whole number of halves."""
 _POINTS = 64
 """Points of a sinusoid for each coefficient that is told of it."""
 
@@ -57,13 +53,13 @@ def without_slow_line(
     white = left / np.sqrt(fit.density[single] * (1.0 + 0.5 * excess))
     order = np.argsort(frequency, kind="stable")
     sums = np.concatenate(([0.0], np.cumsum(white[order] ** 2)))
-    least, low, high = fine.line_chance / (_WIDEST * len(order)), 0, 0
-    for width in range(1, min(_WIDEST, len(order)) + 1):
+    least, low, high = fine.line_chance / (fine.line_widest * len(order)), 0, 0
+    for width in range(1, min(fine.line_widest, len(order)) + 1):
         chances = chi2_sf(sums[width:] - sums[:-width], width)
         place = int(np.argmin(chances))
         if chances[place] < least:
             least, low, high = float(chances[place]), place, place + width
-    if high == low or np.min((frequency * length)[order[low:high]]) < LEAST_CYCLES:
+    if high == low or np.min((frequency * length)[order[low:high]]) < fine.line_cycles:
         return None
     near = float(np.average(frequency[order[low:high]], weights=white[order[low:high]] ** 2))
     at, columns, amplitude = _sinusoid(spectrum, fit, near)
