@@ -225,10 +225,7 @@ def infer(
         scores = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in likeliest])
         settled = factors[int(np.argmax(scores))] == 1.0
         points = whites[int(np.argmax(scores))]
-        fields = (Field(setting, columns, m, _nodes(found)) for m in points.noises)
-        rescored = over_noises(found, fields, points.log_priors)
-        by_noise = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in rescored])
-        points = replace(points, log_posteriors=by_noise)
+        points, rescored = _over_all_noises(found, setting, columns, points)
         if settled and points.best == best:
             break
         points = points.within(priors.hopeless)
@@ -284,11 +281,27 @@ def _rows(
     return usable, unusable
 
 
+def _over_all_noises(
+    found: Sequence[Explanation], setting: Setting, columns: Columns, points: NoisePoints
+) -> tuple[NoisePoints, list[Explanation]]:
+    """Noises as likely as they are beside explanations, and these at each noise, the likeliest first."""
+    nodes, told = _nodes(found), [replace(e, by_noise=()) for e in found]
+    more: NoisePoints | None = points
+    while more is not None:
+        fields = (Field(setting, columns, noise, nodes) for noise in more.noises)
+        told = over_noises(told, fields, more.log_priors)
+        points = points if more is points else points.and_more(more)
+        by_noise = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in told])
+        points = replace(points, log_posteriors=by_noise)
+        more = points.beyond(setting.priors.slow_noise)
+    return points, told
+
+
 def over_noises(
     explanations: Sequence[Explanation], fields: Iterable[Field], log_priors: Sequence[float]
 ) -> list[Explanation]:
-    """Explanations with their evidence at each noise, the likeliest first."""
-    by_noise: list[list[float]] = [[] for _ in explanations]
+    """Explanations with their evidence at further noises, the likeliest first."""
+    by_noise = [list(e.by_noise) for e in explanations]
     for held, log_prior in zip(fields, log_priors):
         data, first = held.base.data, held.fixed.shape[1]
         square = float(data @ data)

@@ -33,13 +33,24 @@ from fogml.signals.whitening import Whitener
 
 @dataclass(frozen=True, eq=False)
 class NoisePoints:
-    """Noises, the logarithms of their priors, and those of their posterior beside what may act."""
+    """Noises, the logarithms of their priors, and those of their posterior beside what may act.
+
+    Attributes
+    ----------
+    steps
+        How far flicker and random walk of each lie above what was expected of them, in prior standard
+        deviations.
+    static
+        The static run that says how likely each is; None where the prior does.
+    """
 
     noises: tuple[NoiseModel, ...]
+    steps: tuple[tuple[float, float], ...]
     log_priors: tuple[float, ...]
     prior: NoisePrior
     source: str
     log_posteriors: FloatArray
+    static: StaticRun | None = None
 
     def within(self, behind: float) -> NoisePoints:
         """Those that are no further behind the likeliest [nats]."""
@@ -47,6 +58,7 @@ class NoisePoints:
         return replace(
             self,
             noises=tuple(self.noises[i] for i in kept),
+            steps=tuple(self.steps[i] for i in kept),
             log_priors=tuple(self.log_priors[i] for i in kept),
             log_posteriors=self.log_posteriors[kept],
         )
@@ -54,6 +66,34 @@ class NoisePoints:
     def with_white(self, factor: float) -> NoisePoints:
         """With white noise so many times as strong."""
         return replace(self, noises=tuple(replace(n, N=factor * n.N) for n in self.noises))
+
+    def beyond(self, offsets: Sequence[float]) -> NoisePoints | None:
+        """What follows where the likeliest lies at the grid's upper end, a step of `offsets` on; None else.
+
+        Where slow noise exceeds all that a model expects of it, the end of a grid is no reason to call it a
+        cause. A static run says itself how far it goes.
+        """
+        if self.static is not None:
+            return None
+        best = self.steps[self.best]
+        ends = [max(values) for values in zip(*self.steps)]
+        at_end = [value == end and end > 0.0 for value, end in zip(best, ends)]
+        if not any(at_end):
+            return None
+        grown = [end + offsets[-1] - offsets[-2] if at else end for end, at in zip(ends, at_end)]
+        flicker, walk = ({*values, last} for values, last in zip(zip(*self.steps), grown))
+        more = [s for s in product(sorted(flicker), sorted(walk)) if s[0] > ends[0] or s[1] > ends[1]]
+        return _points(self.prior, self.source, self.static, self.noises[0].N, more)
+
+    def and_more(self, more: NoisePoints) -> NoisePoints:
+        """These and others."""
+        return replace(
+            self,
+            noises=self.noises + more.noises,
+            steps=self.steps + more.steps,
+            log_priors=self.log_priors + more.log_priors,
+            log_posteriors=np.concatenate([self.log_posteriors, more.log_posteriors]),
+        )
 
     @property
     def best(self) -> int:
@@ -156,35 +196,44 @@ def noise_points(
     settings, scene, offsets = setting.priors.noise, setting.scene, setting.priors.slow_noise
     families = [f for f in unknown_families(scene.grids) if f.id in settings.smooth]
     columns = Columns.of(families, scene, setting.values)
-    held = dict(zip(NAMES, prior.deviations))
-
-    def at(white: float, b: float, k: float) -> NoiseModel:
-        flicker = prior.centre.B * float(np.exp(b * held["B"]))
-        return NoiseModel(white, flicker, prior.centre.K * float(np.exp(k * held["K"])))
-
     least = settings.noiseless * prior.centre.N
     white = first_noise(setting, prior).N
     for step in settings.white_steps:
         while True:
             tried = [max(white / step, least), white, white * step]
-            scores = [_score(setting, columns, at(w, 0.0, 0.0)) for w in tried]
+            scores = [_score(setting, columns, replace(prior.centre, N=w)) for w in tried]
             best = int(np.argmax(scores))
             if best == 1 or tried[best] == white:
                 break
             white = tried[best]
     told = None if static is None else StaticRun.of(static, settings)
+    points = _points(prior, source, told, white, list(product(offsets[:-1], offsets))).within(negligible)
+    found = np.array([_score(setting, columns, noise) for noise in points.noises])
+    return replace(points, log_posteriors=found + points.log_posteriors)
+
+
+def _points(
+    prior: NoisePrior,
+    source: str,
+    static: StaticRun | None,
+    white: float,
+    steps: Sequence[tuple[float, float]],
+) -> NoisePoints:
+    """Noises at steps from what was expected, as likely as their priors have them."""
+    held = dict(zip(NAMES, prior.deviations))
     noises: list[NoiseModel] = []
-    log_priors = []
-    for b, k in product(offsets[:-1], offsets):
-        noise = at(white, b, k)
+    kept, log_priors = [], []
+    for b, k in steps:
+        flicker = prior.centre.B * float(np.exp(b * held["B"]))
+        noise = NoiseModel(white, flicker, prior.centre.K * float(np.exp(k * held["K"])))
         if noise not in noises:
             noises.append(noise)
+            kept.append((b, k))
             own = replace(noise, N=prior.centre.N)
-            log_priors.append(-0.5 * (b * b + k * k) if told is None else told.log_likelihood(own))
-    kept = [i for i, p in enumerate(log_priors) if p > max(log_priors) - negligible]
-    noises, log_priors = [noises[i] for i in kept], [log_priors[i] for i in kept]
-    total = np.array([_score(setting, columns, n) + p for n, p in zip(noises, log_priors)])
-    return NoisePoints(tuple(noises), tuple(log_priors), prior, source, total)
+            log_priors.append(-0.5 * (b * b + k * k) if static is None else static.log_likelihood(own))
+    return NoisePoints(
+        tuple(noises), tuple(kept), tuple(log_priors), prior, source, np.array(log_priors), static
+    )
 
 
 def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:

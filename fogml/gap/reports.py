@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
@@ -207,6 +208,25 @@ def _since(found: Inference, onset: Onset) -> str:
     return f"acts from {onset.run} on, {onset.time_s:.0f} s into it"
 
 
+def _in_time(found: Inference) -> set[str]:
+    """What unknown causes look like that go in time alone, as slow noise does."""
+    return {f.words for f in found.columns.families if f.id == "steps" or f.id.startswith("time_")}
+
+
+def _slow_noise(found: Inference) -> str:
+    """A sentence where no static run was given and slow noise is beyond what the prior's grid holds."""
+    points, offsets = found.points, found.setting.priors.slow_noise
+    flicker, walk = points.steps[points.best]
+    if points.static is not None or (flicker <= offsets[-2] and walk <= offsets[-1]):
+        return ""
+    _, most_flicker, most_walk = points.prior.deviations
+    times = math.exp(max(flicker * most_flicker, walk * most_walk))
+    return (
+        f"Slow noise is taken as {short(times, 2)} times what the model states, which may hide a gap: give "
+        "a static run (--noise)."
+    )
+
+
 def headline(
     found: Inference,
     unknown: Unknown,
@@ -264,12 +284,16 @@ def headline(
     if verdict in ("unknown", "partly_explained"):
         like = unknown.looks_like
         said.append(f"Something acts that is not known{': it ' + like if like else ''}.")
+        if found.points.static is None and like in _in_time(found):
+            said.append("Slow noise of the gyro itself looks like that: give a static run (--noise).")
         for n in [n for n in nearest if n.effect not in {f.effect for f in shown if f.named}][:2]:
             if n.share >= found.setting.priors.reported.near_share:
                 said.append(
                     f"Nearest known cause: {titles[n.effect].title}, in whatever form, holds "
                     f"{percent(n.share, 0)} of the gap."
                 )
+    if said_of_noise := _slow_noise(found):
+        said.append(said_of_noise)
     runs = [found.scene.runs[i].run.name for i in found.scene.in_time]
     first = min((runs.index(s.run) for s in segments), default=0)
     if first > 0:

@@ -60,6 +60,27 @@ def test_the_same_twin_with_its_own_sensors_leaves_no_gap(tactical, runs):
     assert max(errors) < 3.0
 
 
+def test_slow_noise_beyond_what_the_twin_states_is_no_unknown(tactical):
+    """Flicker and random walk of a tactical gyro are 10 times what the shipped nominal twin expects."""
+    nominal = load_twin("nominal")
+    loud = replace(nominal, noise=tactical.noise)
+    made = [_run(loud, 21), _run(loud, 22, hot=40), _run(loud, 23, hot=45)]
+    found = diagnose(TwinModel(nominal), made[:2], made[2:], plan=False)
+    assert found.verdict == "no_gap"
+    noise = found.noise.coefficients
+    assert max(noise["B"] / nominal.noise.B, noise["K"] / nominal.noise.K) > 5.0
+    assert any("what the model states" in line and "--noise" in line for line in found.headline)
+
+
+def test_what_goes_in_time_alone_may_be_slow_noise_where_no_static_run_says(tactical, runs):
+    tenth = np.floor(np.linspace(0.0, 11.0, len(runs[0])))
+    moved = runs[0].with_columns(gyro=runs[0].gyro_deg_h + 4.0 * np.isin(tenth, (2, 5, 6, 9)))
+    found = diagnose(TwinModel(tactical), [moved, runs[1]], runs[2:], plan=False)
+    assert found.unknown.probability > 0.9
+    assert found.unknown.looks_like.startswith(("goes in steps in time", "wanders with time"))
+    assert "Slow noise of the gyro itself looks like that: give a static run (--noise)." in found.headline
+
+
 def test_turn_on_bias_closes_beside_a_constant_of_the_held_out_run(tactical):
     twin = replace(tactical.without_effect("turn_on_bias"), noise=replace(tactical.noise, B=0.0, K=0.0))
     made = [_run(twin, seed, sample_s=120.0) for seed in range(5)]

@@ -10,7 +10,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.gap.model import TwinModel
-from fogml.gap.noise import StaticRun, prior_of, white_noise
+from fogml.gap.noise import NoisePoints, StaticRun, prior_of, white_noise
 from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -119,3 +119,42 @@ def test_a_static_run_is_taken_as_means_over_even_rows_from_its_first_sample_on(
     assert found.row_s == 20.0
     assert found.values == pytest.approx(gyro.reshape(50, 10).mean(axis=1))
     assert found.end_s == pytest.approx(500.0 + 20.0 * np.arange(1, 51))
+
+
+def points(steps, likeliest, static=None) -> NoisePoints:
+    """A grid whose likeliest point is one of its steps."""
+    prior, source = prior_of(MODEL, None)
+    noises = tuple(NoiseModel(NOISE.N, NOISE.B * 3.0**b, NOISE.K * 3.0**k) for b, k in steps)
+    told = np.array([0.0 if step == likeliest else -5.0 for step in steps])
+    return NoisePoints(noises, steps, (0.0,) * len(steps), prior, source, told, static)
+
+
+GRID = tuple((b, k) for b in (-1.0, 0.0, 1.2) for k in (-1.0, 0.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("likeliest", "wanted"),
+    [
+        ((1.2, 0.0), {(2.0, k) for k in (-1.0, 0.0, 2.0)}),
+        ((0.0, 2.0), {(b, 2.8) for b in (-1.0, 0.0, 1.2)}),
+        ((1.2, 2.0), {(2.0, k) for k in (-1.0, 0.0, 2.0, 2.8)} | {(b, 2.8) for b in (-1.0, 0.0, 1.2)}),
+    ],
+)
+def test_a_grid_of_noises_goes_on_where_the_likeliest_is_at_its_upper_end(likeliest, wanted):
+    held = points(GRID, likeliest)
+    more = held.beyond((1.2, 2.0))
+    assert set(more.steps) == wanted
+    for (b, k), noise, log_prior in zip(more.steps, more.noises, more.log_priors):
+        factors = MODEL.noise.factor_B**b, MODEL.noise.factor_K**k
+        assert pytest.approx(factors) == (noise.B / NOISE.B, noise.K / NOISE.K)
+        # A log-normal prior, of which a factor is a standard deviation.
+        assert log_prior == pytest.approx(-0.5 * (b * b + k * k))
+    both = held.and_more(more)
+    assert len(both.noises) == len(both.steps) == len(both.log_posteriors) == len(GRID) + len(wanted)
+
+
+def test_a_grid_of_noises_ends_within_and_where_a_static_run_says_how_far_it_goes():
+    assert points(GRID, (0.0, 0.0)).beyond((1.2, 2.0)) is None
+    assert points(GRID, (1.2, 2.0), StaticRun.of(static(), STANDARD.noise)).beyond((1.2, 2.0)) is None
+    # Noise of which nothing is expected has no steps.
+    assert points(((-1.0, -1.0),), (-1.0, -1.0)).beyond((1.2, 2.0)) is None
