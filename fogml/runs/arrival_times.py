@@ -24,7 +24,7 @@ SHORT_INTERVALS = 0.5
 LEAST_BURSTS = 8
 """Bursts from which on their period is told."""
 MOST_OF_THEM = 0.8
-"""Share of the bursts, and of the intervals within them, that must fit."""
+"""Share of the samples that must lie in bursts that fit, and of the intervals within them."""
 TIME_BETWEEN = 0.45
 """Share of the time that lies between bursts, at least: it is what the samples in a burst are for."""
 DECISIVE_SIGMA = 3.0
@@ -105,7 +105,9 @@ def burst_ends(time: FloatArray) -> IndexArray | None:
     sizes, periods = np.diff(ends), np.diff(time[ends])
     interval = float(np.median(periods / sizes))
     fits = np.abs(periods - sizes * interval) < 0.5 * float(np.median(periods))
-    return ends if np.count_nonzero(fits) >= MOST_OF_THEM * len(fits) else None
+    # Nor are the first and the last longer: of a logger that becomes quicker one holds all that follows.
+    outer = np.minimum([ends[0] + 1, count - ends[-1]], sizes[fits].max(initial=0))
+    return ends if sizes[fits].sum() + outer.sum() >= MOST_OF_THEM * len(time) else None
 
 
 def _mean_up_to(time: FloatArray, longest: float) -> float:

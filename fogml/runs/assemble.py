@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -39,8 +39,6 @@ DROPPING = ("repaired_rows", "repaired_repeats")
 """Codes of the findings that count rows which are gone."""
 _MOST_NAMES = 20
 _LONGEST_NAME = 40
-
-
 MOST_DROPPED = 0.02
 """Repair drops no more than this share of the rows, or one row, unless it is told to."""
 
@@ -57,9 +55,7 @@ def runs_of_table(
         `most_dropped` of the rows.
     """
     columns, gyro_unit, tick_s, notes = _internal_columns(table)
-    findings = [*table.findings, *notes]
-    for column, unit in map(parse_header, table.cells):
-        findings += small_shares(column, unit, columns[column]) if column in columns else []
+    findings = [*table.findings, *notes, *told_by_the_whole(table.cells, columns)]
     return runs_of_columns(
         columns,
         Rows(table.file, table.row_name, table.called),
@@ -71,6 +67,14 @@ def runs_of_table(
         repair=repair,
         most_dropped=most_dropped,
     )
+
+
+def told_by_the_whole(cells: Collection[str], columns: Mapping[str, FloatArray]) -> Iterator[Finding]:
+    """What only all rows tell of a file's columns, in internal units: shares of one, other clocks."""
+    stated = {name: unit for name, unit in map(parse_header, cells) if name in columns}
+    for name, unit in stated.items():
+        yield from small_shares(name, unit, columns[name])
+    yield from other_clocks(columns["time"], columns, stated)
 
 
 def runs_of_columns(
@@ -193,6 +197,7 @@ class Assembler:
     facts: Facts | None = None
     last_time: float = -np.inf
     samples: int = 0
+    cells: tuple[str, ...] = ()
 
     def block(self, table: RawTable) -> Run:
         """The next block as a run.
@@ -203,7 +208,10 @@ class Assembler:
             For every fault, also for time that goes back or repeats from one block to the next.
         """
         columns, gyro_unit, tick_s, findings = _internal_columns(table)
-        rows, named = np.arange(len(table), dtype=np.intp), Rows(table.file, table.row_name, table.called)
+        self.cells = table.cells
+        within = f"rows {self.samples + 1} to {self.samples + len(table)}"
+        rows = np.arange(len(table), dtype=np.intp)
+        named = Rows(table.file, table.row_name, table.called, within)
         finite_rows(named, columns, rows, repair=False)
         time = columns["time"]
         ordered = in_order(time, columns, tick_s=tick_s, row_name=table.row_name) if len(time) else None
@@ -285,7 +293,6 @@ def _internal_columns(
             message += "; a temperature is used once it is called T, T_in, T_out, T1 … or T_case"
             message += _of_faces(unknown)
         notes.append(Finding("unknown_column", message, column=unknown[0], count=len(unknown)))
-        notes += other_clocks(columns["time"], {name: columns[name] for name in unknown}, stated)
     return columns, gyro_unit, tick_s, notes
 
 

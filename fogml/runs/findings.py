@@ -46,8 +46,8 @@ OF_OUTPUT = ("implausible_earth_rate", "implausible_scale_factor", "implausible_
 
 
 def first_of_all(findings: Iterable[Finding]) -> list[Finding]:
-    """Findings, those first that make every figure wrong."""
-    return sorted(findings, key=lambda finding: finding.code not in FIRST_OF_ALL)
+    """Findings, each once, those first that make every figure wrong."""
+    return sorted(dict.fromkeys(findings), key=lambda finding: finding.code not in FIRST_OF_ALL)
 
 
 def standstill(findings: Iterable[Finding]) -> Finding | None:

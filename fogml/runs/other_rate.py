@@ -15,7 +15,7 @@ import numpy as np
 from fogml.arrays import FloatArray, IndexArray
 from fogml.errors import InputError
 from fogml.numerals import duration, short
-from fogml.runs.columns import DUTY, column_spec, conversion, is_accepted, parse_header
+from fogml.runs.columns import DUTY, TIME_ON, column_spec, conversion, is_accepted, parse_header
 from fogml.runs.findings import Finding
 from fogml.runs.reader_process import StoredArray, StoredFile
 from fogml.runs.run import Run
@@ -112,23 +112,28 @@ def _at(time: FloatArray, known: FloatArray, values: FloatArray, hold: bool) -> 
 def other_clocks(
     time: FloatArray, columns: Mapping[str, FloatArray], units: Mapping[str, str | None]
 ) -> Iterator[Finding]:
-    """What is said of columns, in the units stated, that count up and show other times than the clock [s]."""
+    """What is said of unknown columns, in the units stated, that count up and show other times [s]."""
     for name, values in columns.items():
-        unit = units.get(name)
-        sound = np.isfinite(values) & np.isfinite(time)
-        if unit is None or not is_accepted("time", unit) or np.count_nonzero(sound) < _LEAST_TIMES:
-            continue
-        own, its = time[sound], values[sound] * conversion("time", unit, "")[0]
-        apart = (its - its[0]) - (own - own[0])
-        step_s = float(np.median(np.abs(np.diff(own))))
-        if np.all(np.diff(its) > 0.0) and np.max(np.abs(apart)) > 2.0 * step_s:
-            worst = int(np.argmax(np.abs(apart)))
-            shown, true = (short(float(clock[worst] - clock[0]), 6) for clock in (its, own))
-            told = (
-                f"'{name}' counts up as a clock does and shows {shown} s where 'time' shows {true} s; what "
-                "goes by it belongs into a file of its own, or a profile names it as the clock"
-            )
-            yield Finding("other_clock", told, column=name)
+        unit = None if column_spec(name) or name == TIME_ON else units.get(name)
+        if unit is not None and is_accepted("time", unit):
+            yield from _other_clock(name, time, values, conversion("time", unit, "")[0])
+
+
+def _other_clock(name: str, time: FloatArray, values: FloatArray, second: float) -> Iterator[Finding]:
+    sound = large.each(lambda *x: np.isfinite(x).all(axis=0), values, time, kind=bool)
+    own, its = large.chosen(time, sound), large.chosen(values, sound)
+    if len(own) < _LEAST_TIMES or any((steps <= 0.0).any() for _, steps in large.differences(its)):
+        return
+    shown, true = (large.each(lambda x, start=x[0]: x - start, x) for x in (its, own))
+    apart = large.each(lambda x, y: np.abs(second * x - y), shown, true)
+    worst = int(np.argmax(apart))
+    if apart[worst] > 2.0 * large.median(lambda: (np.abs(steps) for _, steps in large.differences(own))):
+        its_s, own_s = short(second * float(shown[worst]), 6), short(float(true[worst]), 6)
+        told = (
+            f"'{name}' counts up as a clock does and shows {its_s} s where 'time' shows {own_s} s; what goes "
+            "by it belongs into a file of its own, or a profile names it as the clock"
+        )
+        yield Finding("other_clock", told, column=name)
 
 
 def held_beyond(

@@ -198,22 +198,25 @@ REPAIR = "--repair"
 
 
 class Rows(NamedTuple):
-    """How messages name the rows of a table: base name of the file, and a row by its number from 0."""
+    """How messages name the rows of a table: base name of the file, and a row by its number from 0; of a part
+    of a file `within` names the rows that it holds."""
 
     file: str
     row_name: Callable[[int], str]
     called: Mapping[str, str] = {}
+    within: str = ""
 
     def fault(self, name: str, row: int, values: FloatArray, found: BoolArray, cure: str) -> str:
         """What to say of faulty values, the first of them in a row by its number, and how to mend them."""
-        if found.all():
+        is_whole = not self.within and bool(found.all())
+        if is_whole:
             needed = name in ("time", "gyro")
             cure = "correct them" if needed else "leave the column out where it was not recorded"
-        no_other = ", and no other" if found.all() else ""
+        no_other = ", and no other" if is_whole else ""
         return (
             f"{self.file}, column '{self.called.get(name, name)}', {self.row_name(row)}: the value is "
-            f"{fault_of(values[np.argmax(found)])}, {int(found.sum())} such in the column{no_other}; "
-            f"{cure}"
+            f"{fault_of(values[np.argmax(found)])}, {int(found.sum())} such in "
+            f"{self.within or 'the column'}{no_other}; {cure}"
         )
 
 
@@ -246,13 +249,16 @@ def order_error(table: Rows, rows: IndexArray, time: FloatArray, ordered: Ordere
         cure = f"{why}; correct it, or give 'sample_s' in an import profile in place of the clock"
         return step_error(table, int(rows[at]), time[at] == time[at - 1], cure)
     told = ", and ".join(fault.told for fault in ordered.faults)
+    if table.within:  # of which the rows of legs are counted
+        told = f"in {table.within} {told.partition(' (')[0]}"
     cures = " and ".join(dict.fromkeys(fault.cure for fault in ordered.faults))
     return step_error(
         table, int(rows[at]), time[at] == time[at - 1], f"{told}; correct it, or {REPAIR} {cures}"
     )
 
 
-def step_error(table: Rows, row: int, repeats: bool, cure: str = "correct it") -> InputError:
+def step_error(table: Rows, row: int, repeats: bool, cure: str = "") -> InputError:
+    cure = cure or f"correct it, or {REPAIR} brings the rows in order"
     what = "repeats" if repeats else "goes back"
     return InputError(
         f"{table.file}, column 'time', {table.row_name(row)}: time {what}; it must strictly increase: {cure}"

@@ -180,7 +180,7 @@ def stored_file(path: Path, kind: str, keys: Sequence[str], limits: ReadingLimit
             f"{path.name}: damaged or no {reader.label} file ({told}); copy or export it again"
         ) from None
     finally:
-        if process.is_alive:
+        if process.is_alive and not sys.is_finalizing():  # then no thread begins, to time the answer
             with contextlib.suppress(_Fault, InputError):
                 stored.ask({"do": "close"})
 

@@ -9,7 +9,14 @@ from pathlib import Path
 
 from fogml.errors import InputError, listed, quoted
 from fogml.processes import made_ahead
-from fogml.runs.assemble import MOST_DROPPED, Assembler, needs_whole, runs_of_table, too_short
+from fogml.runs.assemble import (
+    MOST_DROPPED,
+    Assembler,
+    needs_whole,
+    runs_of_table,
+    told_by_the_whole,
+    too_short,
+)
 from fogml.runs.checks import check_run
 from fogml.runs.columns import parse_header
 from fogml.runs.findings import Finding
@@ -94,8 +101,10 @@ def read_runs(
         file = opened(path, limits)
         limits.check_repair(path, file.size_mb if repair else 0.0)
         if not repair and file.size_mb > limits.long_mb:
-            long = _joined(path, _blocks(path, file, None, BLOCK_ROWS, axis, limits), name)
-            return [long.with_findings(check_run(long))]
+            assembler = Assembler(path)
+            long = _joined(path, _blocks(assembler, file, None, BLOCK_ROWS, axis, limits), name)
+            told = told_by_the_whole(assembler.cells, long.columns)
+            return [long.with_findings((*told, *check_run(long)))]
         table = one.table(_read_table(file, repair, limits))
         runs = runs_of_table(table, path, repair=repair, name=name, most_dropped=most_dropped)
     return [run.with_findings(check_run(run)) for run in map(one.run, runs)]
@@ -153,11 +162,11 @@ def read_blocks(
         )
         return
     with unchanged(*run_sources(path)):
-        yield from _blocks(path, opened(path, limits), columns, block_rows, axis, limits)
+        yield from _blocks(Assembler(path), opened(path, limits), columns, block_rows, axis, limits)
 
 
 def _blocks(
-    path: Path,
+    assembler: Assembler,
     file: Opened,
     columns: Collection[str] | None,
     block_rows: int,
@@ -165,8 +174,7 @@ def _blocks(
     limits: ReadingLimits,
 ) -> Iterator[Run]:
     """As `read_blocks`, of a file that is opened."""
-    assembler = Assembler(path)
-    one = OneAxis(axis)
+    path, one = assembler.path, OneAxis(axis)
     blocks = _table_blocks(file, block_rows, one.columns(columns), limits)
     for table in map(one.table, made_ahead(blocks)):
         held = [parse_header(cell)[0] for cell in table.columns]

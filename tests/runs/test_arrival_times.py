@@ -76,6 +76,8 @@ def test_no_bursts_in_other_clocks():
         "a third lost": even[rng.uniform(size=ROWS) < 0.67],
         "every second lost": even[::2],
         "few gaps": even + 50.0 * (np.arange(ROWS) // 700),
+        "five times as quick at last": np.cumsum(np.where(np.arange(ROWS) < 2500, 5.0, 1.0)),
+        "quick in the middle": np.cumsum(np.where(np.abs(np.arange(ROWS) - 3000) < 1800, 1.0, 5.0)),
     }
     for name, time in clocks.items():
         run = Run(name, {"time": time, "gyro": rng.normal(size=len(time))})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
 from fogml.report.inspect_page import inspect_page
+from fogml.runs import reading
 from fogml.runs.checks import check_run
 from fogml.runs.facts import Facts
 from fogml.runs.noise_of_run import noise_report
@@ -90,6 +93,52 @@ def test_a_long_run_gives_the_figures_of_a_short_one(
     assert long.facts == short.facts
     assert all(np.array_equal(long.columns[name], values) for name, values in short.columns.items())
     _same(expected, _told(long))
+
+
+def test_what_all_rows_tell_of_columns_is_told_of_a_long_file_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    time = np.arange(6000.0)
+    time[4000:] += 8.0
+    # A clock 1000 ppm fast: 6 s in all, and in no thousand rows over two samples.
+    heater = np.where(time < 3000.0, 0.4, 0.8)
+    text = "\n".join(
+        f"{t!r},{7 + t % 7},{1.001 * t!r},{h}" for t, h in zip(time.tolist(), heater, strict=True)
+    )
+    path = tmp_path / "run.csv"
+    path.write_text(f"time [s],gyro [deg/h],logger [s],heater [%]\n{text}\n")
+    short = read_run(path, limits=HELD)
+    assert "shows 6013.01 s where 'time' shows 6007 s" in "; ".join(f.message for f in short.findings)
+    monkeypatch.setattr(reading, "BLOCK_ROWS", 1000)
+    assert read_run(path, limits=LONG).findings == short.findings
+    assert {"gap", "other_clock", "small_shares"} <= {finding.code for finding in short.findings}
+    # Where a column of another rate has it read whole nothing is told twice.
+    sparse = "".join(f"{t!r},7.{i % 7},{20 + i if i % 5 == 0 else ''}\n" for i, t in enumerate(time.tolist()))
+    path.write_text("time [s],gyro [deg/h],T [degC]\n" + sparse)
+    assert read_run(path, limits=LONG).findings == read_run(path, limits=HELD).findings
+
+
+def test_a_fault_of_a_long_file_is_counted_in_the_rows_that_were_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "BLOCK_ROWS", 1000)
+    for spoilt, told in (
+        (
+            (-1, math.nan),
+            "'gyro', line 1502: the value is missing (NaN), 500 such in rows 1001 to 2000; correct",
+        ),
+        (
+            (0, 0.0),
+            "line 1502: time goes back; it must strictly increase: in rows 1001 to 2000 the clock restarts",
+        ),
+    ):
+        rows = [[float(i), i % 7.0] for i in range(4000)]
+        for i in range(1500, 4000):
+            rows[i][spoilt[0]] = spoilt[1] + i - 1500
+        path = tmp_path / "run.csv"
+        path.write_text("time [s],gyro [deg/h]\n" + "".join(f"{t},{g}\n" for t, g in rows))
+        with pytest.raises(InputError, match=re.escape(told)):
+            read_run(path, limits=LONG)
 
 
 def test_a_long_run_takes_no_memory_of_its_length(monkeypatch: pytest.MonkeyPatch) -> None:

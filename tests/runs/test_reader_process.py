@@ -154,6 +154,16 @@ def test_threads_have_processes_of_their_own(hdf5):
     assert lengths == [50, 50, 50]
 
 
+def test_a_program_ends_whose_blocks_are_not_all_asked_for(hdf5):
+    # What is in a cycle is let go of at the very end, when no thread can begin any more.
+    script = (
+        "import sys; from fogml.runs.reading import read_blocks\n"
+        "held = [read_blocks(sys.argv[1], block_rows=10)]; held.append(held); print(len(next(held[0])))"
+    )
+    ended = subprocess.run([sys.executable, "-c", script, str(hdf5)], capture_output=True, timeout=20)
+    assert (ended.returncode, ended.stdout.split(), ended.stderr) == (0, [b"10"], b"")
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the closed input ends it, once it reads")
 def test_the_process_ends_with_its_parent_whatever_it_is_in(tmp_path):
     script = tmp_path / "child.py"
