@@ -118,8 +118,9 @@ REMEDIES = {
     **dict.fromkeys(NO_ROOM, "make room and run the command again"),
     errno.EROFS: "choose another place",
     errno.ENAMETOOLONG: "choose a shorter name",
+    errno.ENOMEM: "close other programs or use a shorter run",
 }
-"""What to do where something can't be written."""
+"""What to do where something can't be written, or begun for want of memory."""
 
 
 class Held(InputError):

@@ -130,9 +130,9 @@ class StoredFile:
         if told is None:
             raise InputError(f"{self.path.name}: damaged: {self._process.end()}; copy or export it again")
         if "memory" in told:
+            more = f"more than {self.memory / 1e6:.0f} MB, or than a program may have here"
             raise InputError(
-                f"{self.path.name}: damaged, or too large: reading it takes more than "
-                f"{self.memory / 1e6:.0f} MB; copy or export it again"
+                f"{self.path.name}: damaged, or too large: reading it takes {more}; copy or export it again"
             )
         if "size" in told:
             raise InputError(

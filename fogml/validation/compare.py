@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from fogml.arrays import BoolArray
 from fogml.errors import FogmlError, InputError, in_one_line
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S
@@ -13,7 +14,7 @@ from fogml.validation.judge import index_notes, judgement_of
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import check_turn_on_band, repeatability_of
 from fogml.validation.results import Judgement
-from fogml.validation.run_errors import RunErrors, common_rows, run_errors
+from fogml.validation.run_errors import RunErrors, run_errors
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -150,21 +151,24 @@ class _Contest:
         limits: Mapping[str, float] | None = None,
     ) -> dict[str, Judgement]:
         """Judgements of the models that can be fitted to a split; the others leave the contest."""
-        fitted: dict[str, tuple[DriftModel, list[RunErrors]]] = {}
+        fitted: dict[str, DriftModel] = {}
+        rows: list[BoolArray] = []
         for name in list(self.makers):
             self._step(name)
             try:
                 model = self.makers[name]().fit(train)
-                errors = [run_errors(model, run, any_unit=True) for run in train]
-                errors += [run_errors(model, run, any_unit=self._any_unit) for run in test]
-                fitted[name] = model, errors
+                full = [errors.full for errors in self._errors(model, train, test)]
+                # Those of each run whose windows are full for every model.
+                rows = [one & other for one, other in zip(rows, full, strict=True)] if rows else full
+                fitted[name] = model
             except _REFUSALS as error:
                 self._drop(name, error)
-        rows = [common_rows(of_run) for of_run in zip(*(errors for _, errors in fitted.values()))]
         judgements = {}
-        for name, (model, errors) in fitted.items():
-            shared = [e.within(full) for e, full in zip(errors, rows, strict=True)]
+        for name, model in fitted.items():
             try:
+                # Evaluated once more: errors of all models at once take more memory than their runs.
+                every = zip(self._errors(model, train, test), rows, strict=True)
+                shared = [errors.within(common) for errors, common in every]
                 judgements[name] = judgement_of(
                     model,
                     shared[: len(train)],
@@ -178,6 +182,12 @@ class _Contest:
             except _REFUSALS as error:
                 self._drop(name, error)
         return judgements
+
+    def _errors(self, model: DriftModel, train: Sequence[Run], test: Sequence[Run]) -> Iterator[RunErrors]:
+        for run in train:
+            yield run_errors(model, run, any_unit=True)
+        for run in test:
+            yield run_errors(model, run, any_unit=self._any_unit)
 
     def _drop(self, name: str, error: BaseException) -> None:
         del self.makers[name]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,11 +93,6 @@ def run_errors(model: DriftModel, run: Run, *, any_unit: bool = False) -> RunErr
         notes=(*notes, *left_out),
         interval_averaging_s=model.intervals_.averaging_s,
     )
-
-
-def common_rows(errors: Sequence[RunErrors]) -> BoolArray:
-    """Rows of one run whose windows are full for every model, shape (n,)."""
-    return reduce(np.logical_and, [e.full for e in errors])
 
 
 def training_means(errors: Sequence[RunErrors]) -> tuple[float, float]:

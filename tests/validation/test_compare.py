@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from functools import partial
 
 import numpy as np
@@ -59,6 +60,24 @@ def test_all_are_judged_on_the_same_rows(runs):
     beside = judge(mean, runs[:1], runs[1:2], beside=[late_model])
     assert alone.test[0].rows_used == 3000
     assert beside.test[0].after == result.judgements["mean"].test[0].after != alone.test[0].after
+
+
+def test_errors_of_all_models_are_not_held_at_once():
+    rows, peaks = 20_000, []
+    time = np.arange(float(rows))
+    gyro = np.random.default_rng(1).normal(size=rows)
+    pair = [
+        Run.from_columns(f"{name}.csv", time=time, gyro=gyro + number) for number, name in enumerate("ab")
+    ]
+    for count in (2, 2, 8):
+        tracemalloc.start()
+        try:
+            compare({f"mean {i}": makers("mean")["mean"] for i in range(count)}, pair[:1], pair[1:])
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    # The first time tells what is imported and cached; six more drifts of two runs do not fit.
+    assert peaks[2] - peaks[1] < 6 * 2 * 8 * rows / 2
 
 
 def test_leaving_one_out_of_several_models_is_each_alone(runs):
