@@ -26,6 +26,7 @@ from fogml.gap.model import AnyModel, Candidate, EffectValue, GyroModel, ModelOn
 from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Counterfactual, RunSeries
 from fogml.runs.columns import REPLAYED
+from fogml.runs.lateness import late_rate
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
 from fogml.twin.effect import Effect
@@ -226,12 +227,15 @@ class ByColumn:
         Runs whose gyro, less the stand-in's replay, is recorded less the column.
     apart
         Column less the stand-in's replay [deg/h], by run.
+    late
+        A sentence of each run whose column follows the table's rate late or early.
     """
 
     model: TwinModel
     fit: list[Run]
     held_out: list[Run]
     apart: dict[str, tuple[FloatArray, FloatArray]]
+    late: tuple[str, ...]
 
     def shown(self, found: Diagnosis) -> Diagnosis:
         """A diagnosis with recorded and replayed series as they are, and with what was assumed."""
@@ -241,7 +245,8 @@ class ByColumn:
         )
         series = tuple(self._moved(s, _REPLAYED_SERIES) for s in found.series)
         others = tuple(self._moved(c, ("recorded", "replayed")) for c in found.counterfactuals)
-        return replace(found, series=series, counterfactuals=others, assumed=(*said, *found.assumed))
+        told = replace(found, headline=(*found.headline, *self.late), assumed=(*said, *found.assumed))
+        return replace(told, series=series, counterfactuals=others)
 
     def _moved(self, shown: Shown, names: Sequence[str]) -> Shown:
         """Averages of a run, those of the names moved by what the column is apart from the stand-in."""
@@ -286,18 +291,22 @@ def by_column(twin: Twin, fit: Sequence[Run], held_out: Sequence[Run]) -> ByColu
     Raises
     ------
     InputError
-        If the output is in counts without a scale factor.
+        If the output is in counts without a scale factor, or the column is the output itself.
     """
     fit, held_out = named_apart(fit, held_out)
+    runs = (*fit, *held_out)
+    if same := [run.name for run in runs if np.array_equal(run.columns[REPLAYED], run.gyro_deg_h)]:
+        raise InputError(f"{same[0]}, column 'replayed': is the recorded output itself, not a simulator's")
     stand_in = _nearest(twin, fit)
     apart, made = {}, []
-    for run in (*fit, *held_out):
+    for run in runs:
         rest = run.columns[REPLAYED] - replay(stand_in, run)
         apart[run.name] = run.time, rest
         columns = {name: values for name, values in run.columns.items() if name != REPLAYED}
         facts = run.facts.model_copy(update={"scale_factor": None})
         made.append(Run(run.name, {**columns, "gyro": run.gyro_deg_h - rest}, facts, "deg/h"))
-    return ByColumn(TwinModel(stand_in), made[: len(fit)], made[len(fit) :], apart)
+    late = tuple(f"{run.name}: {f.message}." for run in runs for f in late_rate(run, REPLAYED))
+    return ByColumn(TwinModel(stand_in), made[: len(fit)], made[len(fit) :], apart, late)
 
 
 def _nearest(twin: Twin, runs: Sequence[Run]) -> Twin:

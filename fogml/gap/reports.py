@@ -284,7 +284,7 @@ def headline(
     if verdict in ("unknown", "partly_explained"):
         like = unknown.looks_like
         said.append(f"Something acts that is not known{': it ' + like if like else ''}.")
-        if found.points.static is None and like in _in_time(found):
+        if found.points.static is None and like in _in_time(found) and not _slow_noise(found):
             said.append("Slow noise of the gyro itself looks like that: give a static run (--noise).")
         for n in [n for n in nearest if n.effect not in {f.effect for f in shown if f.named}][:2]:
             if n.share >= found.setting.priors.reported.near_share:

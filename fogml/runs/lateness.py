@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.numerals import short
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
@@ -21,6 +21,7 @@ _LOW, _HIGH = 0.1, 0.9
 
 def late_rate(
     run: Run,
+    output: str = "gyro",
     *,
     least_s: float = 1.0,
     samples: float = 2.0,
@@ -38,6 +39,8 @@ def late_rate(
     ----------
     run
         The run; a `rate` that rests on levels tells it, one that moves all the time does not.
+    output
+        The column that follows it: the gyro, or what a simulator gives for that, ``replayed``.
     least_s, samples
         A lateness of at least this [s] and so many sample intervals is told: less lies within what is left
         out about each change.
@@ -57,7 +60,7 @@ def late_rate(
     if len(starts) < 2:
         return
     try:
-        gyro = run.gyro_deg_h
+        gyro = run.gyro_deg_h if output == "gyro" else run.columns[output]
     except InputError:
         return  # counts whose scale factor is not stated
     before, after = np.append(0, stops[:-1]), np.append(starts[1:], len(run))
@@ -80,10 +83,11 @@ def late_rate(
     told = np.abs(late - middle) <= max(0.2 * abs(middle), 1.5 * run.sample_s)
     if abs(middle) < max(least_s, samples * run.sample_s) or told.sum() < alike * len(found):
         return
+    what, whose = ("the output", "gyro") if output == "gyro" else (quoted(output), "simulator")
     message = (
-        f"the output follows the recorded rate {short(abs(middle), 2)} s "
-        f"{'late' if middle > 0.0 else 'early'} ({told.sum()} of {len(found)} steps): the clocks of gyro and "
-        "table differ. Shift one of them, as what is left out about each change of the rate grows by as much"
+        f"{what} follows the recorded rate {short(abs(middle), 2)} s {'late' if middle > 0.0 else 'early'} "
+        f"({told.sum()} of {len(found)} steps): the clocks of {whose} and table differ. Shift one "
+        "of them, as what is left out about each change of the rate grows by as much"
     )
     yield Finding("late_rate", message, column="rate", row=int(starts[0]) + 1, count=int(told.sum()))
 

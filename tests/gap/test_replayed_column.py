@@ -70,3 +70,24 @@ def test_runs_that_have_it_and_runs_that_do_not_are_refused():
     assert not has_column([bare])
     with pytest.raises(InputError, match="bare: no column 'replayed"):
         has_column([one, bare])
+
+
+def test_a_column_that_is_the_recorded_output_itself_is_refused():
+    one, other = run(1), run(2)
+    same = other.with_columns(replayed=other.gyro)
+    with pytest.raises(InputError, match="r2, column 'replayed': is the recorded output itself"):
+        by_column(load_twin("nominal"), [one], [same])
+
+
+def test_a_simulator_whose_clock_is_late_beside_the_tables_is_told():
+    """Levels of 0 and 10 deg/s of 5 min each; the simulator follows them 30 s late."""
+    time = 2.0 * np.arange(1800.0)
+    rate = 10.0 * (np.floor(time / 300.0) % 2)
+    noise = np.random.default_rng(3).standard_normal(len(time))
+    columns = {"time": time, "rate": rate, "T": 25.0 + time / 600.0}
+    for late_s, said in ((0, 0), (30, 1)):
+        replayed = 3600.0 * np.interp(time - late_s, time, rate)
+        made = Run.from_columns("r", gyro=3600.0 * rate + noise, replayed=replayed, **columns)
+        told = by_column(load_twin("nominal"), [made], [])
+        assert len(told.late) == said
+        assert all("'replayed' follows the recorded rate 30 s late" in words for words in told.late)
