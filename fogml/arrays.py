@@ -17,5 +17,5 @@ def unmasked(values: Any) -> Any:
     """Values of any kind, of a masked array those that it hides as missing: NaN, of dates NaT."""
     if not np.ma.isMaskedArray(values):
         return values
-    missing = values.dtype.type("NaT") if values.dtype.kind in "mM" else np.nan
+    missing = np.array("NaT", values.dtype) if values.dtype.kind in "mM" else np.nan
     return np.where(np.ma.getmaskarray(values), missing, np.ma.getdata(values))

@@ -66,6 +66,19 @@ def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
     raise _asked
 
 
+def open_closed_streams() -> None:
+    """Open what takes and gives nothing in place of a standard stream that the caller closed.
+
+    Else the next file opened has its number, and what a library or a child process prints stands in it.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # of numbers the lowest that is free
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", encoding="utf-8", closefd=False))
+
+
 def quiet_libraries() -> None:
     """Keep warnings of libraries from stderr, unless Python was started with some asked for.
 

@@ -2,14 +2,16 @@
 
 Command modules load on use, so that ``fogml --help`` stays quick. Exit 0: done. 1: done, and a
 stated limit was not met. 2: bad input or usage. 3: an error that nobody expected, told in a report
-file. 130, 143: interrupted, terminated.
+file. 130, 143: interrupted, terminated. 141: what read the output has ended.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import click
@@ -18,7 +20,7 @@ from fogml import __version__
 from fogml.cli.given import HELP_NAMES, HelpContext, load
 from fogml.errors import FogmlError, did_you_mean_of, printable
 from fogml.locks import REMEDIES
-from fogml.processes import end_as_interrupted, heed_interrupt, quiet_libraries
+from fogml.processes import end_as_interrupted, heed_interrupt, open_closed_streams, quiet_libraries
 
 COMMANDS = {
     "demo": (
@@ -96,7 +98,7 @@ COMMANDS = {
 }
 """Name of each command: where its settings are, and its help in one line."""
 
-DONE, LIMIT_NOT_MET, BAD_INPUT, UNEXPECTED, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, LIMIT_NOT_MET, BAD_INPUT, UNEXPECTED, INTERRUPTED, UNREAD = 0, 1, 2, 3, 130, 141
 
 
 class Group(click.Group):
@@ -167,19 +169,19 @@ class Program(Group):
     def make_context(self, *words: Any, **more: Any) -> Any:
         """As click's, its complaints told as all others are."""
         try:
-            return super().make_context(*words, **more)
+            with _read_on():
+                return super().make_context(*words, **more)
         except click.UsageError as error:
             _fail_usage(error)
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            return self._invoked(ctx)
+            with _read_on():
+                return self._invoked(ctx)
         except click.UsageError as error:
             _fail_usage(error)
         except FogmlError as error:
             fail(str(error))
-        except BrokenPipeError:
-            raise
         except OSError as error:
             place = f"{error.filename}: " if error.filename else ""
             remedy = REMEDIES.get(error.errno or 0)
@@ -206,6 +208,18 @@ class Program(Group):
         except Exception:
             heed_interrupt()
             raise
+
+
+@contextmanager
+def _read_on() -> Iterator[None]:
+    """End by a status of its own where what reads the output has ended: click's and rich's is a limit's."""
+    try:
+        yield
+    except (BrokenPipeError, SystemExit) as end:
+        if not isinstance(end, BrokenPipeError) and not isinstance(end.__context__, BrokenPipeError):
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python writes the rest at its end
+        sys.exit(UNREAD)
 
 
 def _tell(message: str) -> None:
@@ -284,6 +298,7 @@ app = Program(
 
 def main() -> None:
     """Entry point of the program ``fogml``."""
+    open_closed_streams()
     end_as_interrupted()
     quiet_libraries()
     for stream in (sys.stdout, sys.stderr):

@@ -50,7 +50,7 @@ class Prose:
 
 def prose(declared: Effect) -> Prose:
     """What the docstring of an effect's class says."""
-    text = inspect.getdoc(type(declared)) or declared.title
+    text = inspect.cleandoc(type(declared).__doc__ or declared.title)
     equations, remarks, source = [], [], ""
     blocks = text.split("\n\n")
     for block in blocks[1:]:

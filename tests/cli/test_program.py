@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -104,10 +105,21 @@ def test_an_interrupt_leaves_nothing(run_files, tmp_path, number, status, module
     assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "a.yaml", "b.csv", "b.yaml", "waiting"}
 
 
-def test_a_closed_pipe_is_no_traceback(run_files, tmp_path):
-    shell = " ".join(f"'{part}'" for part in [*PROGRAM, "inspect", str(run_files[0])]) + " | true"
+@pytest.mark.parametrize("words", ["inspect {run}", "effects --json", "--help"])
+def test_a_closed_pipe_is_told_from_a_missed_limit(run_files, words):
+    # By rich, by click, and before a command begins.
+    command = shlex.join([*PROGRAM, *words.format(run=run_files[0]).split()])
+    shell = command + " | true; exit ${PIPESTATUS[0]}"
     found = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=120)
-    assert "Traceback" not in found.stderr
+    assert (found.returncode, found.stderr) == (141, "")
+
+
+@pytest.mark.parametrize(("closed", "status"), [(">&-", 0), ("<&- >&- 2>&- --nothing", 2)])
+def test_standard_streams_that_are_closed(run_files, tmp_path, closed, status):
+    command = shlex.join([*PROGRAM, "inspect", str(run_files[0])])
+    found = subprocess.run(["bash", "-c", f"{command} {closed}"], timeout=120, cwd=tmp_path)
+    assert found.returncode == status
+    assert not list(tmp_path.glob("fogml-report*"))
 
 
 @pytest.mark.parametrize("whole", [whole_file, whole_folder])

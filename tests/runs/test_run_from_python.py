@@ -33,7 +33,7 @@ FAULTS = {
     "a matrix": ({"gyro": GYRO[:, None]}, r"'gyro': of shape \(100, 1\)"),
     "another length": ({"T": TEMPERATURE[1:]}, "columns differ in length"),
     "text": ({"T": np.full(100, "warm")}, "'T': holds .*numbers were expected"),
-    "a missing date": ({"time": with_value(np.arange(100).astype("M8[s]"), np.datetime64("NaT"))}, "NaT"),
+    "a missing date": ({"time": with_value(np.arange(100).astype("M8[s]"), np.datetime64("NaT", "s"))}, "NaT"),
     "objects": ({"gyro": np.array([None] * 100)}, "'gyro'.*(missing|no number)"),
 }
 

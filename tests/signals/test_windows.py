@@ -47,6 +47,7 @@ def by_definition(  # type: ignore[no-untyped-def]
     edge = 1e-6 * sample_s
     span = {"block": 2.0, "slope": 1.0, "exp": 3.0, "first": 0.0}[method] * window_s
     longest = 3.0 * sample_s if method == "first" else max(window_s / 4.0, 3.0 * sample_s)
+    longest += 0.01 * sample_s  # times are rounded
     start = 0
     for i in range(len(x)):
         if i and time[i] - time[i - 1] > longest:

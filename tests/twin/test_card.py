@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.twin.pictures import SLOW_DEG_H, allan_curve, pictures, rate_curves
+from fogml.twin.pictures import SLOW_DEG_H, allan_curve, pictures, prose, rate_curves
 from fogml.twin.registry import effect, effects
 from fogml.twin.scenes import scene_names
 
@@ -100,3 +100,11 @@ def test_pictures_agree_with_the_words() -> None:
         effect("self_heating").amplitude.typical(), rel=0.1
     )
     assert last["T_electronics"] > last["T_in"] > last["T_out"] > last["T_case"] > 0.0
+
+
+def test_a_class_without_a_docstring_has_its_title_on_its_card():
+    # With Python's -OO no class has one; that of a base class is no card of this effect.
+    class Plain(type(effect("sensor_lag"))):
+        title = "A lag of its own"
+
+    assert prose(Plain.__new__(Plain)).summary == "A lag of its own"
