@@ -12,6 +12,7 @@ from fogml.runs.run import Run
 TIME = np.arange(100.0)
 GYRO = np.random.default_rng(0).normal(size=100)
 TEMPERATURE = 20.0 + 0.01 * TIME
+NEVER = np.datetime64("NaT", "s")
 
 
 def with_value(values, value):
@@ -33,7 +34,7 @@ FAULTS = {
     "a matrix": ({"gyro": GYRO[:, None]}, r"'gyro': of shape \(100, 1\)"),
     "another length": ({"T": TEMPERATURE[1:]}, "columns differ in length"),
     "text": ({"T": np.full(100, "warm")}, "'T': holds .*numbers were expected"),
-    "a missing date": ({"time": with_value(np.arange(100).astype("M8[s]"), np.datetime64("NaT", "s"))}, "NaT"),
+    "a missing date": ({"time": with_value(np.arange(100).astype("M8[s]"), NEVER)}, "NaT"),
     "objects": ({"gyro": np.array([None] * 100)}, "'gyro'.*(missing|no number)"),
 }
 
