@@ -14,10 +14,9 @@ from fogml.blind.make import make_cases
 from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.gap.diagnosis import diagnose
-from fogml.gap.grids import Grids
 from fogml.gap.planning.next_run import RepeatSettings
 from fogml.gap.planning.plan import plan_runs
-from fogml.gap.settings import Priors
+from fogml.gap.settings import Grids, Priors
 from fogml.gap.step_settings import NoiseSettings, Reported, RowSettings, SearchSettings
 from fogml.lab.rate_tests import Criteria
 from fogml.models.auto import AutoModel

@@ -17,8 +17,7 @@ from fogml.arrays import FloatArray
 from fogml.gap.frame import Setting, fixed_columns, whitener_of
 from fogml.gap.model import EffectValue
 from fogml.gap.planning.fisher import Unknowns, expected, unknowns, usual_value
-from fogml.gap.planning.programme_design import Design
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_family import Design, Family
 from fogml.gap.planning.rehearsal import FINE_S, Rehearsal, Stage, stage
 from fogml.gap.planning.separating import LEAST_DISTANCE, distances, members_of
 from fogml.gap.scene import Scene
@@ -78,9 +77,8 @@ class Bench:
         self.kept, self.acting = rows.kept, Replayer(rows.run)
         self.whitener = whitener_of(noise, rows)
         self.noise = Noise(white.N, white.B, white.K)
-        setting = Setting(
-            Scene((rows,), 1, self.twin.grade), self.on.model.constants, STANDARD, (), self.values
-        )
+        scene = Scene((rows,), 1, self.twin.grade, constants=self.values)
+        setting = Setting(scene, self.on.model.constants, STANDARD, ())
         own = replace(self.on.model.twin, sensors=sensors)
         self.missed = fixed_columns(setting, 0, own)[:, len(self.constants) :]
         self.missed_white = self._whiten(self.missed)

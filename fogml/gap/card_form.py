@@ -31,11 +31,13 @@ class _Unknown:
     @property
     def free(self) -> bool:
         """Whether its prior leaves room."""
-        return self.quantity.all_round or self._law[1] > 0.0
+        return self._law[1] > 0.0
 
     @property
     def _law(self) -> tuple[float, float, bool]:
-        """Middle and standard deviation of the prior, and whether they are of the logarithm."""
+        """Middle and standard deviation of the prior, a radian of an angle; whether of the logarithm."""
+        if self.quantity.all_round:
+            return 0.0, math.degrees(1.0), False
         if self.quantity.signed:
             return 0.0, self.quantity.range(self.grade)[1] / Z90, False
         return self.quantity.law(self.grade)
@@ -53,8 +55,6 @@ class _Unknown:
 
     def unknown(self, value: float) -> float:
         """What stands for a value."""
-        if self.quantity.all_round:
-            return math.radians(value)
         middle, spread, log = self._law
         if log:
             value = math.log(value) if value > 0.0 else -math.inf
@@ -62,16 +62,14 @@ class _Unknown:
 
     def value(self, unknown: float) -> float:
         """What an unknown stands for."""
-        if self.quantity.all_round:
-            return math.degrees(unknown) % 360.0
         middle, spread, log = self._law
         value = middle + spread * unknown
+        if self.quantity.all_round:
+            return value % 360.0
         return math.exp(value) if log else value
 
     def scale(self, unknown: float) -> float:
         """How far the value moves with the unknown, in the value's unit."""
-        if self.quantity.all_round:
-            return math.degrees(1.0)
         _, spread, log = self._law
         return spread * (self.value(unknown) if log else 1.0)
 
@@ -203,18 +201,9 @@ class Root:
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Effects that fit best.
+    """Effects that fit best, how well they fit [nats], and what they make beside all else, shape (n,).
 
-    Attributes
-    ----------
-    effects
-        Their amplitudes and shapes.
-    fit
-        How well they fit [nats].
-    made
-        What they make beside all else, shape (n,).
-    unknowns, covariance
-        Of each; of all together.
+    ``unknowns`` are those of each, ``covariance`` is that of all together.
     """
 
     effects: tuple[Fitted, ...]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import null_space
+from scipy.special import softmax
 
 from fogml.gap.card_form import Fitted, Form, Optimum, Root, optimum
 from fogml.gap.catalogue import nodes_of, power_cycles, signature_of
@@ -127,8 +128,7 @@ def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, An
     sizes = np.array([one.amplitude for one in every])
     fits = np.array([found.fit for found in optima]) + setting.priors.log_usual(np.abs(sizes) / usual)
     best = every[int(np.argmax(fits))]
-    weights = np.exp(fits - fits.max())
-    weights /= weights.sum()
+    weights = softmax(fits)
     values = [_facing(best, one, angles) for one in every]
     amplitude, form_se = best.amplitude, setting.priors.form_error * best.amplitude
     off = np.array([size - amplitude for size, _ in values])
@@ -153,9 +153,9 @@ def _starts(declared: Effect, field: Field, beside: LinearGaussian, told: Mappin
     """Of the nodes of an effect's grid that explain most the place that drives them, amplitude and shape."""
     setting, scene = field.setting, field.setting.scene
     reported = setting.priors.reported
-    nodes = _near_lines(declared, nodes_of(declared, scene, setting.values), told)[: reported.card_nodes]
+    nodes = _near_lines(declared, nodes_of(declared, scene), told)[: reported.card_nodes]
     build = signature_of(declared, nodes)
-    by_run = [list(islice(build(r, scene, setting.values), reported.card_nodes)) for r in scene.fit]
+    by_run = [list(islice(build(r, scene), reported.card_nodes)) for r in scene.fit]
     stacked = field.whitening.stacked([np.concatenate([b.columns for b in own], axis=1) for own in by_run])
     least = max(map(abs, declared.amplitude.limits)) ** -2.0
     angles = [q.name for q in declared.shape if q.all_round]
@@ -244,7 +244,7 @@ def _drawn(declared: Effect, told: Mapping[str, Any], field: Field, beside: Line
             phase = 2.0 * np.pi * shape["frequency"] * rows.time_s
             own.append(np.column_stack([np.sin(phase), np.cos(phase)]))
         elif cycles:
-            own.append(next(power_cycles(rows, scene, field.setting.values)).columns)
+            own.append(next(power_cycles(rows, scene)).columns)
         else:
             own.append(rows.response(declared, shape, None, field.setting.values)[:, None])
     columns = field.whitening.stacked(apart(own, len(runs)))

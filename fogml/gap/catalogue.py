@@ -13,7 +13,7 @@ from fogml.errors import InputError, known_are
 from fogml.gap import thermal_families as thermal
 from fogml.gap.own_simulator import OwnEffect
 from fogml.gap.rows import READ, READ_GROUPS, Rows, slopes, through_nominal
-from fogml.gap.scene import Block, Build, Constants, Family, Scene, column_block, steps_are_coarse
+from fogml.gap.scene import Block, Build, Family, Scene, column_block, steps_are_coarse
 from fogml.gap.shapes import AT_AMPLITUDE, GridNode, grid
 from fogml.gap.unknown import unknown_families
 from fogml.signals.bases import lag, rate
@@ -28,12 +28,12 @@ def signature_of(declared: Effect, only: Sequence[GridNode] | None = None) -> Bu
     Driven by each temperature that may be the one of its place; over some nodes of the grid where given.
     """
 
-    def build(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-        nodes = nodes_of(declared, scene, constants) if only is None else only
+    def build(rows: Rows, scene: Scene) -> Iterator[Block]:
+        nodes = nodes_of(declared, scene) if only is None else only
         positive = not declared.amplitude.signed and declared.amplitude.limits[0] >= 0.0
         for name, driving, weight in _driving(declared, rows, scene):
             for node in nodes:
-                draws = [rows.response(declared, draw, driving, constants) for draw in node.draws]
+                draws = [rows.response(declared, draw, driving, scene.constants) for draw in node.draws]
                 columns = np.column_stack(draws) @ node.mix
                 yield Block(columns, {**node.shape, "place": name}, weight, positive)
 
@@ -45,12 +45,12 @@ def driving_of(declared: Effect, rows: Rows, scene: Scene, place: str) -> Mappin
     return next(held for name, held, _ in _driving(declared, rows, scene) if name == place)
 
 
-def nodes_of(declared: Effect, scene: Scene, constants: Constants) -> tuple[GridNode, ...]:
+def nodes_of(declared: Effect, scene: Scene) -> tuple[GridNode, ...]:
     """The grid of an effect's shapes."""
     key = ("nodes", declared.id)
     if key not in scene.cache:
         spans = {"s": scene.span_s, "degC": scene.span_degc, "sample": scene.row_s}
-        on_first = partial(scene.runs[0].response, declared, constants=constants)
+        on_first = partial(scene.runs[0].response, declared, constants=scene.constants)
         scene.cache[key] = grid(declared, scene.grade, on_first, spans, scene.grids)
     return tuple(scene.cache[key])
 
@@ -71,7 +71,7 @@ def _driving(
     return [("", None, 1.0)]
 
 
-def moisture(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def moisture(rows: Rows, scene: Scene) -> Iterator[Block]:
     """What follows the air's humidity late, alike at all temperatures or not."""
     if not any(scene.records("humidity")):
         yield Block(np.zeros((len(rows), 1)))
@@ -86,14 +86,14 @@ def moisture(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
         yield column_block(one, other, warm * one, warm * other)
 
 
-def power_cycles(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def power_cycles(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Another constant after each power-on."""
     most = max(len(r.even.power_ons_s) for r in scene.runs) + 1
     cycle = rows.even.power_cycle[rows.kept]
     yield Block((cycle[:, None] == np.arange(most)).astype(np.float64))
 
 
-def machines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def machines(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Duties of the chamber's machines that are recorded, with short lags; else a line of two harmonics."""
     grids = scene.grids
     told = {n: scene.records(n) for n in ("heater", "compressor")}
@@ -111,12 +111,12 @@ def machines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     yield column_block(*behind)
 
 
-def lines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def lines(rows: Rows, scene: Scene) -> Iterator[Block]:
     """A line of any phase."""
     yield from _lines(rows, scene, 1, 1e-3, 0.5 / scene.row_s)
 
 
-def supply(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def supply(rows: Rows, scene: Scene) -> Iterator[Block]:
     """The supply's changes, and a line beside them."""
     change = rows.of(rows.even.drive("supply"))
     change = change - change.mean()
@@ -135,9 +135,9 @@ def _lines(rows: Rows, scene: Scene, harmonics: int, least: float, most: float) 
         yield Block(scaled, {"frequency": frequency, "period": 1.0 / frequency}, 1.0 / count)
 
 
-def sensor_lag(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def sensor_lag(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Sensors that are late: what they miss, through the fitted nominal."""
-    told, time = slopes(rows, constants), rows.even.time
+    told, time = slopes(rows, scene.constants), rows.even.time
     missed = {n: rate(time, rows.even.temperatures[n]) / 60.0 for n in rows.readings}
     second = {n: scene.grids.sensor_lag_s * rate(time, v) / 60.0 for n, v in missed.items()}
     together = through_nominal(rows, told, missed)
@@ -148,9 +148,9 @@ def sensor_lag(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block
         yield column_block(through_nominal(rows, told, own), positive=True)
 
 
-def sensor_placement(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def sensor_placement(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Sensors that feel another place: what it differs by, through the fitted nominal."""
-    told = slopes(rows, constants)
+    told = slopes(rows, scene.constants)
     held = {n: rows.even.temperatures[n] for n in rows.readings if n in READ}
     for other in ("T_case", "T_chamber", "T_electronics"):
         elsewhere = rows.even.temperature(other)
@@ -162,25 +162,25 @@ def sensor_placement(rows: Rows, scene: Scene, constants: Constants) -> Iterator
     yield column_block(through_nominal(rows, told, behind), positive=True)
 
 
-def sensor_steps(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def sensor_steps(rows: Rows, scene: Scene) -> Iterator[Block]:
     """What the readings' steps hide, through the fitted nominal."""
     hidden = {n: rows.even.temperatures[n] - values for n, values in rows.readings.items()}
-    yield column_block(through_nominal(rows, slopes(rows, constants), hidden), positive=True)
+    yield column_block(through_nominal(rows, slopes(rows, scene.constants), hidden), positive=True)
 
 
-def clock_skew(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def clock_skew(rows: Rows, scene: Scene) -> Iterator[Block]:
     """The output late or early, by a skew that may grow."""
     declared = effect("logger_skew")
     hours = (rows.time_s - rows.time_s[0]) / 3600.0
     for skew in declared.amplitudes:
-        change = rows.response(declared, {"growth": 0.0, AT_AMPLITUDE: skew}, None, constants)
+        change = rows.response(declared, {"growth": 0.0, AT_AMPLITUDE: skew}, None, scene.constants)
         yield Block(change[:, None], {AT_AMPLITUDE: skew})
         yield Block(np.column_stack([change, 0.3 * hours * change]), {AT_AMPLITUDE: skew, "growth": 0.3})
 
 
-def other_plant(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def other_plant(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Heat that flows otherwise: temperatures within that differ from those read, through the nominal."""
-    told, time = slopes(rows, constants), rows.even.time
+    told, time = slopes(rows, scene.constants), rows.even.time
     held = {n: rows.even.temperatures[n] for n in rows.readings if n in READ}
     errors = [{n: lag(time, v, s) - v for n, v in held.items()} for s in scene.grids.plant_lags_s]
     if any(scene.records("T_out")):
@@ -189,7 +189,7 @@ def other_plant(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Bloc
     yield column_block(*columns, rows.of(rate(time, rows.even.temperature("T_out"))))
 
 
-def even_in_rate(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def even_in_rate(rows: Rows, scene: Scene) -> Iterator[Block]:
     """What does not change sign with the rate, by any power of it."""
     turning, full = _turning(rows, scene)
     powers = [rows.samples(1e-6 * full * (np.abs(turning) / full) ** p) for p in (1.0, 2.0, 0.5)]
@@ -197,14 +197,14 @@ def even_in_rate(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Blo
     yield column_block(*powers)
 
 
-def odd_in_rate(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def odd_in_rate(rows: Rows, scene: Scene) -> Iterator[Block]:
     """What changes sign with the rate and is not in proportion to it."""
     declared = effect("sf_nonlinearity")
     shape = declared.default_shape(scene.grade)
     for ripple, periods in ((0.0, (5.0,)), (0.1, (5.0, 10.0, 20.0, 40.0))):
         for period in periods:
             held = shape | {"ripple_share": ripple, "ripple_period": period}
-            yield column_block(rows.response(declared, held, None, constants), ripple_period=period)
+            yield column_block(rows.response(declared, held, None, scene.constants), ripple_period=period)
     turning, full = _turning(rows, scene)
     share = np.abs(turning) / full
     yield column_block(*(rows.samples(1e-6 * turning * share**p) for p in (0.5, 1.0, 2.0, 4.0)))
@@ -216,7 +216,7 @@ def _turning(rows: Rows, scene: Scene) -> tuple[FloatArray, float]:
     return rows.by_sample.recorded.input_rate_deg_h * np.ones(len(rows.by_sample.row)), 3600.0 * most
 
 
-def vibration(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def vibration(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Any growth with the vibration."""
     level = rows.even.drive("vibration")
     most = max(float(r.even.drive("vibration").max(initial=0.0)) for r in scene.runs) or 1.0
@@ -286,9 +286,9 @@ def families_of(twin: Twin, scene: Scene, without: Iterable[str] = ()) -> tuple[
     return (*known, *unknown_families(scene.grids), Family("other_plant", "plant", other_plant))
 
 
-def _of_either_sign(build: Build, rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _of_either_sign(build: Build, rows: Rows, scene: Scene) -> Iterator[Block]:
     """What corrects an effect that is there."""
-    return (block._replace(positive=False) for block in build(rows, scene, constants))
+    return (block._replace(positive=False) for block in build(rows, scene))
 
 
 def _can_show(declared: Effect, scene: Scene, twin: Twin) -> bool:

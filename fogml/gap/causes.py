@@ -23,9 +23,7 @@ from fogml.runs.regimes import Regimes
 from fogml.signals.distributions import chi2_sf
 
 
-def found_cause(
-    found: Inference, every: Foretold, cause: Cause, probability: float, card: Card, share: float
-) -> Found:
+def found_cause(found: Inference, every: Foretold, cause: Cause, card: Card, share: float) -> Found:
     """A cause as reports have it; `every` foretells all causes together."""
     scene, settings = found.scene, found.setting.priors.reported
     declared = scene.candidates[cause.ids[0]]
@@ -37,7 +35,7 @@ def found_cause(
         effect=cause.ids[0],
         stage=declared.stage,
         members=cause.ids,
-        probability=probability,
+        probability=cause.probability,
         prior_probability=found.search.prior_probability(cause.ids),
         amplitude=size,
         parameters={
@@ -53,7 +51,7 @@ def found_cause(
         place=declared.place,
         times_usual=abs(card.lacking) / high,
         log_odds=(cause.odds, cause.within, cause.log_share),
-        left_out=cause.left_out if probability >= NAMED else (),
+        left_out=cause.left_out if cause.probability >= NAMED else (),
     )
 
 
@@ -212,21 +210,12 @@ def _group_courses(
     return np.asarray((flat - field.fixed @ taken).reshape(parts.shape))
 
 
-def beyond_constants(
-    found: Inference, recalibrated: Foretold, parts: Sequence[FloatArray]
-) -> list[FloatArray]:
-    """What causes make on each fit run [deg/h], shape (m_r, ...), less what the constants would take up."""
-    flat = [p.reshape(len(p), -1) for p in parts]
-    taken = recalibrated.posterior.covariance @ (found.field.fixed.T @ found.field.whitening.stacked(flat))
-    left = [p - found.setting.fixed[i] @ taken for i, p in enumerate(flat)]
-    shown = (p - run.errors_in(p) for p, run in zip(left, found.field.whitening.runs))
-    return [own.reshape(p.shape) for own, p in zip(shown, parts)]
-
-
 def energy(found: Inference, every: Foretold, recalibrated: Foretold, member: Member) -> float:
     """Squares of what a cause makes on the fit runs beyond the constants [(deg/h)^2]."""
-    parts = [every.of_member(i, member) for i in range(found.scene.fitted)]
-    return float(sum(np.sum(p**2) for p in beyond_constants(found, recalibrated, parts)))
+    field, made = found.field, [every.of_member(i, member)[:, None] for i in range(found.scene.fitted)]
+    taken = recalibrated.posterior.covariance @ (field.fixed.T @ field.whitening.stacked(made))
+    left = [p - found.setting.fixed[i] @ taken for i, p in enumerate(made)]
+    return float(sum(np.sum((p - run.errors_in(p)) ** 2) for p, run in zip(left, field.whitening.runs)))
 
 
 def _told(groups: Iterable[str], values: FloatArray, run: str | None, regime: str | None) -> list[CauseShare]:

@@ -11,28 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from fogml.errors import InputError, did_you_mean
-from fogml.gap.better_twin import counterfactuals
-from fogml.gap.causes import cause_shares, energy, found_cause
+from fogml.gap.causes import cause_shares, found_cause
 from fogml.gap.compensation import compensation_of
-from fogml.gap.doubtful_runs import doubts
 from fogml.gap.fitted_model import Explained, explained
 from fogml.gap.how_far import Foretold, HeldOut
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
 from fogml.gap.model import AnyModel, TwinModel
 from fogml.gap.own_simulator import candidates_of
-from fogml.gap.planning.next_run import next_run, rehearse
+from fogml.gap.planning.next_run import next_run
+from fogml.gap.planning.rehearsal import rehearse
 from fogml.gap.posterior import Cause, Judgement, doubted
-from fogml.gap.reports import (
-    assumed,
-    candidate_evidence,
-    headline,
-    looks_like,
-    noise_of,
-    series_of,
-    stage_energies,
-)
+from fogml.gap.reports import candidate_evidence, noise_of, series_of, stage_energies
 from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.result_parts import Nearest, WhatIf
+from fogml.gap.sentences import assumed, doubts, headline, looks_like
 from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.where import GapOnRun, where
 from fogml.processes import one_thread
@@ -200,7 +192,8 @@ def answered(
 
 
 def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: bool) -> Diagnosis:
-    found, judged, named, cards, fit = told.found, told.judged, told.named, told.cards, told.fit
+    found, judged, cards, fit = told.found, told.judged, told.cards, told.fit
+    named = judged.named
     scene, settings, likeliest = found.scene, found.setting.priors.reported, judged.best.members
     # As the model that is written replays, which has nothing but what is named.
     after = fit.foretold
@@ -211,9 +204,9 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
     whole = (s for s in shares if s.run is None and s.regime is None)
     share = {s.effect: min(max(s.share, 0.0), 1.0) for s in whole}
     items = tuple(
-        found_cause(found, every, c, p, cards[c.ids[0]], share.get(c.ids[0], 0.0))
-        for c, p in zip(judged.causes, told.probabilities)
-        if p >= settings.listed
+        found_cause(found, every, c, cards[c.ids[0]], share.get(c.ids[0], 0.0))
+        for c in judged.causes
+        if c.probability >= settings.listed
     )
     held_out = [
         HeldOut(found, i, recalibrated, likeliest, seed) for i in range(scene.fitted, len(scene.runs))
@@ -223,21 +216,19 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
         GapOnRun(r, recalibrated.left_on(i), sum((every.of_member(i, m) for m in likeliest), 0.0 * r.gap))
         for i, r in enumerate(scene.fit)
     ]
-    stages = stage_energies(found, {m: energy(found, every, recalibrated, m) for m in likeliest})
-    lies = where(gaps, stages, found.points.fit.model, settings)
+    lies = where(gaps, stage_energies(found, every, recalibrated), found.points.fit.model, settings)
     evidence = candidate_evidence(found, judged, [i for f in items if f.named for i in f.members])
     what_if = _what_if(found, named, held_out)
     nearest = _nearest(found, what_if, judged)
     unknown = doubted(Unknown(judged.unknown, looks_like(found, judged)), items)
     verdict = _verdict(named, unknown, judged.nothing < settings.surely_not_nothing)
-    shown = () if verdict == "unknown" else items
-    return Diagnosis(
+    answer = Diagnosis(
         fit=tuple(r.run.name for r in scene.fit),
         held_out=tuple(r.run.name for r in scene.runs[scene.fitted :]),
         noise_run=noise.name if noise else None,
         held_out_is_part=part,
         verdict=verdict,
-        found=shown,
+        found=() if verdict == "unknown" else items,
         suspected=() if verdict != "unknown" else tuple(f for f in items if not f.named),
         unknown=unknown,
         where=lies,
@@ -249,8 +240,8 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
         noise=noise_of(found, after),
         effects=fit.effects,
         uncertainty=fit.uncertainty,
-        counterfactuals=counterfactuals(found, fit, named) if courses else (),
-        series=series_of(found, recalibrated, after),
+        least_suspected=settings.suspected,
+        series=series_of(found, recalibrated, fit, named, courses),
         unusable=found.unusable,
         assumed=assumed(found, fit.constants),
         model=found.model.name,
@@ -258,20 +249,10 @@ def _answer(told: Explained, noise: Run | None, part: bool, seed: int, courses: 
         nearest=nearest,
         shares=shares,
         compensation=compensation_of(found, judged.causes, named),
-        headline=(
-            *headline(
-                found,
-                unknown,
-                verdict,
-                shown,
-                nearest,
-                far,
-                lies.segments,
-                any(found.kind(m) == "plant" for m in likeliest),
-            ),
-            *doubts(found, recalibrated, noise, part),
-        ),
     )
+    other_plant = any(found.kind(m) == "plant" for m in likeliest)
+    said = (*headline(found, answer, other_plant), *doubts(found, recalibrated, noise, part))
+    return replace(answer, headline=said)
 
 
 def _verdict(named: Sequence[Cause], unknown: Unknown, something: bool) -> Verdict:

@@ -51,13 +51,13 @@ class Columns:
     by_run: tuple[FloatArray, ...]
 
     @classmethod
-    def of(cls, families: Sequence[Family], scene: Scene, constants: Mapping[str, float]) -> Columns:
+    def of(cls, families: Sequence[Family], scene: Scene) -> Columns:
         """Every family's blocks."""
         nodes: list[Node] = []
         parts: list[list[FloatArray]] = [[] for _ in scene.runs]
         at = 0
         for f, family in enumerate(families):
-            by_run = [list(family.build(rows, scene, constants)) for rows in scene.runs]
+            by_run = [list(family.build(rows, scene)) for rows in scene.runs]
             # Blocks whose weights add to less are the part of a grid that stands out.
             total = max(sum(b.weight for b in by_run[0]), 1.0)
             for blocks in zip(*by_run, strict=True):

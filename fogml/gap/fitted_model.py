@@ -1,4 +1,4 @@
-"""The model with what is named: constants and effects in their cards' forms, fitted together."""
+"""The model with what is named: constants and effects in their cards' forms, fitted together; as a twin."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import expit
 
 from fogml.arrays import FloatArray
@@ -14,27 +15,28 @@ from fogml.gap.cards import Card, cards_of, in_form, made_beside, replaced
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
-from fogml.gap.model import EffectValue, TwinModel, with_effects
-from fogml.gap.posterior import Cause, Judgement, at_cost, judge
-from fogml.gap.result import NAMED, ConstantFit
+from fogml.gap.model import EffectValue, TwinModel, with_effects, within_limits
+from fogml.gap.posterior import Cause, Judgement, judge
+from fogml.gap.result import Diagnosis
+from fogml.gap.result_parts import ConstantFit
+from fogml.gap.rows import READ
+from fogml.numerals import with_error
+from fogml.runs.run import Run
+from fogml.twin.draws import parameter_values
 from fogml.twin.nominal import NAMES
-from fogml.twin.uncertainty import Uncertainty
+from fogml.twin.plant.fit import PlantFit, fit_plant
+from fogml.twin.plant.standard import QUANTITIES
+from fogml.twin.registry import effect
+from fogml.twin.twin import Twin
+from fogml.twin.uncertainty import Suspected, Uncertainty
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A model with what is named.
+    """A model with what is named: effects and constants as they go together, and what they make of every run.
 
-    Attributes
-    ----------
-    effects, constants
-        As they go together.
-    uncertainty
-        Of both; none of a laboratory's own simulator.
-    foretold
-        What they make of every run.
-    closeness
-        How well forms of effects fit the runs [nats]; 0 without any.
+    ``uncertainty`` is of both, none of a laboratory's own simulator; ``closeness`` is how well forms of
+    effects fit the runs [nats], 0 without any.
     """
 
     effects: tuple[EffectValue, ...]
@@ -46,24 +48,10 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """What is named, with its cards and a model that has it.
-
-    Attributes
-    ----------
-    found, judged
-        The posterior and what is judged by it.
-    probabilities
-        Of its causes, at the cost of a false name.
-    named
-        Those that are surer than not.
-    cards, fit
-        Of each cause, by its effect; of what is named.
-    """
+    """A posterior, what is judged by it, each cause's card by its effect, and a model with what is named."""
 
     found: Inference
     judged: Judgement
-    probabilities: tuple[float, ...]
-    named: tuple[Cause, ...]
     cards: Mapping[str, Card]
     fit: Fit
 
@@ -74,16 +62,14 @@ def explained(found: Inference, cost: float) -> Explained:
     What acts may look like a constant far off, at which effects would meet the wrong output. Then they are
     fitted at the constants that were expected, too, and what fits best is told.
     """
-    judged = judge(found)
-    probabilities = tuple(at_cost(c.probability, cost) for c in judged.causes)
-    named = tuple(c for c, p in zip(judged.causes, probabilities) if p >= NAMED)
+    judged = judge(found, cost)
     options = [found]
     if found.setting.widened:
         options.append(found.meeting({c.name: c.mean for c in found.setting.constants}))
     told = []
     for one in options:
         cards = cards_of(one, judged)
-        told.append(Explained(one, judged, probabilities, named, cards, fitted_model(one, named, cards)))
+        told.append(Explained(one, judged, cards, fitted_model(one, judged.named, cards)))
     best = max(told, key=lambda option: option.fit.closeness)
     return replace(best, judged=replace(judged, unknown=_left_unknown(best)))
 
@@ -202,3 +188,64 @@ def _replayed(found: Inference, values: Mapping[str, EffectValue], foretold: For
     whitening = found.field.whitening
     left = whitening.stacked([r.gap_of(twin) for r in found.scene.fit])
     return Posterior.of(design, left + found.field.fixed[:, :count] @ about[:count]).mean
+
+
+def better_twin(twin: Twin, found: Diagnosis, runs: Sequence[Run]) -> tuple[Twin, tuple[str, ...]]:
+    """A diagnosed twin with what is known and not known of it, and what was fitted in sentences.
+
+    Parameters
+    ----------
+    twin
+        With the constants and effects that were found.
+    found
+        The diagnosis.
+    runs
+        Fit runs, for the plant; without any it stays as it was.
+    """
+    told, matrices, names = [], [], list[str]()
+    if found.uncertainty is not None:
+        names += found.uncertainty.names
+        matrices.append(found.uncertainty.covariance)
+    fitted, why_not = diagnosed_plant(twin, runs)
+    if fitted is not None:
+        twin = replace(twin, plant=fitted.plant)
+        values = parameter_values(twin)
+        scale = np.array([values[name] for name in fitted.names])
+        names += fitted.names
+        matrices.append(fitted.covariance * np.outer(scale, scale))
+        deviations = scale * np.sqrt(np.diag(fitted.covariance))
+        units = {f"plant.{quantity.name}": quantity.unit for quantity in QUANTITIES}
+        sizes = ", ".join(
+            f"{name.removeprefix('plant.')} {with_error(value, sd)} {units.get(name, '')}".rstrip()
+            for name, value, sd in zip(fitted.names, scale, deviations)
+        )
+        told.append(f"Plant fitted to recorded temperatures: {sizes}")
+    elif why_not:
+        told.append(why_not)
+    suspected = {}
+    for f in (*found.found, *found.suspected):
+        if not f.named and f.probability >= found.least_suspected and f.effect not in twin.settings:
+            shape = {name: value.value for name, value in f.parameters.items()}
+            amplitude, held = within_limits(f.effect, f.amplitude.value, shape, twin.grade)
+            suspected[f.effect] = Suspected(f.probability, amplitude, held)
+    if suspected:
+        told.append(f"Suspected, and not on in twin.yaml: {', '.join(suspected)}")
+    source = f"diagnosis of {' and '.join(found.fit)}"
+    uncertainty = Uncertainty(tuple(names), block_diag(*matrices), source) if names else None
+    return replace(twin, uncertainty=uncertainty, suspected=suspected), tuple(told)
+
+
+def diagnosed_plant(twin: Twin, runs: Sequence[Run]) -> tuple[PlantFit | None, str]:
+    """The plant fitted to what runs recorded, or none and, where it could be, why not.
+
+    An effect that follows a temperature which no run recorded was found with that temperature as the twin's
+    own plant has it; with another plant its numbers would no longer be right, so that one stays.
+    """
+    if not runs or not all("T_chamber" in run.columns for run in runs):
+        return None, ""
+    recorded = set.intersection(*(set(run.columns) for run in runs)) | set(READ)
+    for id in twin.settings:
+        lacking = sorted(n for n in effect(id).needs if n.startswith("T_") and n not in recorded)
+        if lacking:
+            return None, f"Plant as it was: {id} follows {lacking[0]}, which was not recorded"
+    return fit_plant(twin, runs), ""

@@ -37,8 +37,6 @@ class Setting:
         What errors of each fit run's readings make of its replay, columns of unit priors, shape (m_r, k_r).
     covariances
         Of those, shape (m_r, m_r), where there are many of a run.
-    values
-        The constants at which effects meet the output: as fitted beside nothing, to begin with.
     widened
         Factors on the standard deviations of constants that are far off, by name.
     """
@@ -47,10 +45,18 @@ class Setting:
     constants: tuple[Constant, ...]
     priors: Priors
     fixed: tuple[FloatArray, ...]
-    values: Mapping[str, float]
     widened: Mapping[str, float] = field(default_factory=dict)
     errors: tuple[FloatArray, ...] = ()
     covariances: tuple[FloatArray | None, ...] = ()
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Constants at which effects meet the output: as fitted beside nothing, to begin with."""
+        return self.scene.constants
+
+    def at(self, values: Mapping[str, float]) -> Setting:
+        """The same at other constants."""
+        return replace(self, scene=replace(self.scene, constants=values))
 
     def with_covariances(self) -> Setting:
         """With the covariances of errors that are as many as it takes to be met more cheaply by those."""
@@ -171,8 +177,7 @@ class Whitening:
 def setting_of(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise: NoiseModel) -> Setting:
     """Constants fitted beside nothing, those widened that are far off, and the fixed block at them."""
     constants = model.constants
-    values = {c.name: c.mean for c in constants}
-    setting = Setting(scene, constants, priors, (), values)
+    setting = Setting(scene, constants, priors, ()).at({c.name: c.mean for c in constants})
     noises = [float(np.median(whitener_of(noise, r, priors.noise.longest_runs).deviation)) for r in scene.fit]
     for _ in range(3):
         # Before the columns, which are as wide as the priors that coefficients are told by.
@@ -186,7 +191,7 @@ def setting_of(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise
         fixed = tuple(fixed_columns(setting, i, plant) for i in range(len(scene.runs)))
         whitening = Whitening(noise, setting)
         found = Posterior.of(whitening.stacked(fixed), whitening.stacked([r.gap for r in scene.fit]))
-        setting = replace(setting, values=setting.values_of(found.mean), fixed=fixed)
+        setting = replace(setting, fixed=fixed).at(setting.values_of(found.mean))
     return setting
 
 

@@ -89,10 +89,8 @@ class Inference:
         The twin whose plant and sensors count.
     setting, columns, points
         Runs and constants; families' blocks; noises.
-    fields
-        Whitened by each noise; the one that fits best holds all blocks, others those that are asked for.
     search
-        At that noise.
+        At the noise that fits best.
     explanations
         The likeliest first.
     unusable
@@ -133,7 +131,7 @@ class Inference:
     def meeting(self, values: Mapping[str, float]) -> Inference:
         """The same with effects' forms as they meet the output of other constants."""
         search, held = copy(self.search), copy(self.field)
-        held.setting = replace(self.setting, values=values)
+        held.setting = self.setting.at(values)
         search.field = held
         return replace(self, setting=held.setting, search=search)
 
@@ -190,9 +188,9 @@ def infer(
         more = [(f"{name}, kept-back part", reason) for name, reason in more if name not in unused]
     scene = Scene((*runs, *held), len(runs), model.grade, (), candidates_of(model), priors.grids)
     _check_motion(scene, priors.rows.least_motion_degc)
+    scene = replace(scene, lines_hz=outstanding_lines(scene))
     prior, source = prior_of(model, noise, priors.noise)
-    setting = setting_of(model, plant, scene, priors, prior.centre)
-    first = first_noise(setting, prior)
+    first = first_noise(scene, prior, priors.noise)
     setting = setting_of(model, plant, scene, priors, first)
     length = gap_length(setting, first)
     priors = priors.reaching(length)
@@ -201,10 +199,8 @@ def infer(
     points = noise_points(setting, prior, source, noise, priors.hopeless)
     setting = setting_of(model, plant, scene, priors, points.fit.model)
     setting = with_form_errors(setting, points.fit.model, length)
-    scene = replace(scene, lines_hz=outstanding_lines(scene))
-    setting = replace(setting, scene=scene)
     tell("building families")
-    columns = Columns.of(families_of(plant, scene, without), scene, setting.values)
+    columns = Columns.of(families_of(plant, scene, without), setting.scene)
     how, factors = priors.search, priors.noise.white_factors
     search: Search | None = None
     for _ in range(how.rounds):
@@ -248,7 +244,7 @@ def foreseen(model: TwinModel, runs: Sequence[Run], noise: NoiseModel, priors: P
     rows = tuple(rows_of(run, model.twin, most, settings=priors.rows) for run in runs)
     scene = Scene(rows, len(rows), model.grade, (), candidates_of(model), priors.grids)
     setting = setting_of(model, model.twin, scene, priors, noise)
-    columns = Columns.of(families_of(model.twin, scene), scene, setting.values)
+    columns = Columns.of(families_of(model.twin, scene), setting.scene)
     return Search(Field(setting, columns, noise))
 
 

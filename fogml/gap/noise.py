@@ -9,6 +9,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from scipy.special import softmax
 
 from fogml.arrays import BoolArray, FloatArray
 from fogml.errors import InputError
@@ -18,6 +19,7 @@ from fogml.gap.linear_gaussian import LinearGaussian, size_gains
 from fogml.gap.model import AnyModel
 from fogml.gap.reading import usable_samples
 from fogml.gap.rows import Rows
+from fogml.gap.scene import Scene
 from fogml.gap.settings import STANDARD
 from fogml.gap.step_settings import NoiseSettings
 from fogml.gap.unknown import unknown_families
@@ -103,8 +105,7 @@ class NoisePoints:
     @cached_property
     def fit(self) -> NoiseFit:
         """Moments of the logarithms of the coefficients."""
-        weights = np.exp(self.log_posteriors - self.log_posteriors.max())
-        weights /= weights.sum()
+        weights = softmax(self.log_posteriors)
         logs = np.log(np.maximum([[getattr(n, name) for name in NAMES] for n in self.noises], 1e-12))
         mean = weights @ logs
         covariance = (weights[:, None] * (logs - mean)).T @ (logs - mean)
@@ -162,7 +163,6 @@ def not_static(noise_run: Run | None, settings: NoiseSettings = STANDARD.noise) 
     """A sentence where temperature moves through a noise run."""
     if noise_run is None:
         return ()
-    noise_run = noise_run.without_dropouts
     warmth = _motion(noise_run, usable_samples(noise_run)[0], settings)
     moved = 0.0 if warmth is None else float(np.ptp(warmth))
     if moved < settings.thermal_degc:
@@ -195,9 +195,9 @@ def noise_points(
     """
     settings, scene, offsets = setting.priors.noise, setting.scene, setting.priors.slow_noise
     families = [f for f in unknown_families(scene.grids) if f.id in settings.smooth]
-    columns = Columns.of(families, scene, setting.values)
+    columns = Columns.of(families, scene)
     least = settings.noiseless * prior.centre.N
-    white = first_noise(setting, prior).N
+    white = first_noise(scene, prior, settings).N
     for step in settings.white_steps:
         while True:
             tried = [max(white / step, least), white, white * step]
@@ -236,10 +236,9 @@ def _points(
     )
 
 
-def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:
+def first_noise(scene: Scene, prior: NoisePrior, settings: NoiseSettings) -> NoiseModel:
     """White noise as second differences of neighbouring rows show it, slow noise as expected."""
-    least = setting.priors.noise.noiseless * prior.centre.N
-    found = [white_noise(rows, least)[0] for rows in setting.scene.fit]
+    found = [white_noise(rows, settings.noiseless * prior.centre.N)[0] for rows in scene.fit]
     return replace(prior.centre, N=float(np.median(found)))
 
 
@@ -292,7 +291,6 @@ class StaticRun:
     @classmethod
     def of(cls, run: Run, settings: NoiseSettings) -> StaticRun:
         """Means over even rows; those with few samples are left out."""
-        run = run.without_dropouts
         usable, _ = usable_samples(run)
         time, values = run.time[usable], run.gyro_deg_h[usable]
         step = float(np.median(np.diff(time)))

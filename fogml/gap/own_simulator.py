@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from fogml.arrays import FloatArray
 from fogml.errors import InputError, known_are
 from fogml.gap.model import AnyModel, Candidate, EffectValue, GyroModel, ModelOnRun, TwinModel
 from fogml.gap.result import Diagnosis
-from fogml.gap.result_parts import Counterfactual, RunSeries
+from fogml.gap.result_parts import RunSeries
 from fogml.runs.columns import REPLAYED
 from fogml.runs.lateness import late_rate
 from fogml.runs.names import named_apart
@@ -56,18 +56,8 @@ class OwnEffect(Effect):
 class OwnOnRun:
     """A model with a run's inputs, its temperatures smooth.
 
-    Attributes
-    ----------
-    model
-        The simulator.
-    run
-        As it is replayed.
-    step_degc
-        Temperatures are moved by so much, up and down, for the slope of a replay.
-    slopes_at
-        Slopes that were worked out, by the constants.
-    off_at
-        What is a little off, the same.
+    Those are moved by ``step_degc``, up and down, for the slope of a replay. Slopes, and what is a little
+    off, are worked out once for constants.
     """
 
     model: GyroModel
@@ -212,23 +202,14 @@ PRIOR_ROWS = 1e-3
 """Weight of the constants' priors, in rows: enough to hold what no run shows at nought, and no more."""
 NAME = "the runs' column 'replayed'"
 _REPLAYED_SERIES = ("recorded", "replayed_before", "replayed_recalibrated", "replayed_after")
-Shown = TypeVar("Shown", RunSeries, Counterfactual)
 
 
 @dataclass(frozen=True, eq=False)
 class ByColumn:
-    """Runs and the model that a diagnosis of a column takes.
+    """The stand-in, and runs whose gyro, less the stand-in's replay, is recorded less the column.
 
-    Attributes
-    ----------
-    model
-        The stand-in.
-    fit, held_out
-        Runs whose gyro, less the stand-in's replay, is recorded less the column.
-    apart
-        Column less the stand-in's replay [deg/h], by run.
-    late
-        A sentence of each run whose column follows the table's rate late or early.
+    ``apart`` holds times [s] and column less the stand-in's replay [deg/h], by run; ``late`` a sentence of
+    each run whose column follows the table's rate late or early.
     """
 
     model: TwinModel
@@ -243,13 +224,12 @@ class ByColumn:
             "Replayed is what the runs' column 'replayed' says; twin.yaml is the nominal twin nearest to it, "
             "with what was found.",
         )
-        series = tuple(self._moved(s, _REPLAYED_SERIES) for s in found.series)
-        others = tuple(self._moved(c, ("recorded", "replayed")) for c in found.counterfactuals)
+        series = tuple(map(self._moved, found.series))
         told = replace(found, headline=(*found.headline, *self.late), assumed=(*said, *found.assumed))
-        return replace(told, series=series, counterfactuals=others)
+        return replace(told, series=series)
 
-    def _moved(self, shown: Shown, names: Sequence[str]) -> Shown:
-        """Averages of a run, those of the names moved by what the column is apart from the stand-in."""
+    def _moved(self, shown: RunSeries) -> RunSeries:
+        """Averages of a run, recorded and replayed moved by what the column is apart from the stand-in."""
         if shown.run not in self.apart:
             return shown
         time, apart = self.apart[shown.run]
@@ -258,7 +238,7 @@ class ByColumn:
         ends = np.searchsorted(time, shown.time_s[:, None] + half)
         count = np.maximum(ends[:, 1] - ends[:, 0], 1)
         mean = (whole[ends[:, 1]] - whole[ends[:, 0]]) / count
-        return replace(shown, **{name: getattr(shown, name) + mean for name in names})
+        return replace(shown, **{name: getattr(shown, name) + mean for name in _REPLAYED_SERIES})
 
 
 def has_column(runs: Sequence[Run]) -> bool:

@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import softmax
 
 from fogml.arrays import FloatArray
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior, left_out_log_density
-from fogml.gap.result import Found, Unknown
+from fogml.gap.result import NAMED, Found, Unknown
 from fogml.gap.search import Explanation, Member
 
 
@@ -25,31 +26,28 @@ class Cause:
         Its family's, with nodes and sizes, the largest first.
     ids
         Effects that these runs don't tell from it, itself first.
-    probability
-        That one of them acts, as far as evidence is trusted.
     evidence
-        The same by the evidence alone.
+        Probability that one of them acts, by the evidence alone.
     carried
         What it adds to the log density of each run given the others, over the best set without it [nats].
     known
         That it, or another known cause in its place, acts, by the evidence alone.
     log_share
         Logarithm of its share of what all causes of the set make, by energy.
-    doubted
-        What of that is not believed.
     left_out
         Effects that were taken off the candidates and look like it.
+    probability
+        That one of them acts, as far as evidence is trusted, at the cost of a false name.
     """
 
     members: tuple[Member, ...]
     ids: tuple[str, ...]
-    probability: float
     evidence: float
     carried: float
     known: float
-    log_share: float = 0.0
-    doubted: float = 0.0
-    left_out: tuple[str, ...] = ()
+    log_share: float
+    left_out: tuple[str, ...]
+    probability: float = 0.0
 
     @property
     def member(self) -> Member:
@@ -81,13 +79,18 @@ class Judgement:
     explanations: tuple[Explanation, ...]
     weights: FloatArray
 
+    @property
+    def named(self) -> tuple[Cause, ...]:
+        """Those that are surer than not."""
+        return tuple(cause for cause in self.causes if cause.probability >= NAMED)
+
     def weight_of(self, family: int) -> float:
         """Posterior probability of the sets that hold a family."""
         return float(sum(w for e, w in zip(self.explanations, self.weights) if family in e.key))
 
 
-def judge(found: Inference) -> Judgement:
-    """Causes of the likeliest set with their classes.
+def judge(found: Inference, cost_of_false_name: float = 1.0) -> Judgement:
+    """Causes of the likeliest set with their classes, at a cost of a false name over a missed one.
 
     The odds of a cause are those of all sets that hold a member of its class; where runs foretell each other
     worse with it than with the best of what is unknown in its place, less so. Forms are never quite known, so
@@ -121,22 +124,14 @@ def judge(found: Inference) -> Judgement:
         cause = Cause(
             tuple(own),
             tuple(families[g].id for g in members),
-            probability=0.0,
             evidence=held,
             carried=carried,
             known=max(known, held),
             log_share=math.log(max(energies[f], 1e-12) / max(sum(energies.values()), 1e-12)),
+            left_out=_left_out(found, best, f),
         )
-        share = cause.log_share
-        believed = priors.believed(cause.odds, log_share=share)
-        causes.append(
-            replace(
-                cause,
-                left_out=_left_out(found, best, f),
-                probability=priors.believed(cause.odds, cause.within, log_share=share),
-                doubted=max(cause.known - believed, 0.0),
-            )
-        )
+        believed = priors.believed(cause.odds, cause.within, log_share=cause.log_share)
+        causes.append(replace(cause, probability=at_cost(believed, cost_of_false_name)))
     causes.sort(key=lambda c: -c.probability)
 
     def weight(counts: Callable[[Explanation], bool]) -> float:
@@ -144,7 +139,7 @@ def judge(found: Inference) -> Judgement:
 
     known_share = 1.0 - weight(lambda e: any(families[f].kind == "unknown" for f in e.key))
     for cause in causes:
-        known_share *= 1.0 - cause.doubted
+        known_share *= 1.0 - max(cause.known - priors.believed(cause.odds, log_share=cause.log_share), 0.0)
     nothing = weight(lambda e: all(families[f].kind == "plant" for f in e.key))
     # Sums of weights end beside 0 and 1 by rounding.
     unknown = float(np.clip(1.0 - known_share, 0.0, 1.0))
@@ -153,9 +148,7 @@ def judge(found: Inference) -> Judgement:
 
 def _weights(explanations: Sequence[Explanation]) -> FloatArray:
     """Posterior of the sets, shape (n,)."""
-    scores = np.array([e.score for e in explanations])
-    weights = np.exp(scores - scores.max())
-    return np.asarray(weights / weights.sum())
+    return np.asarray(softmax([e.score for e in explanations]))
 
 
 def _energies(found: Inference, explanation: Explanation) -> dict[int, float]:

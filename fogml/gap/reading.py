@@ -161,12 +161,11 @@ def usable_samples(run: Run, settings: RowSettings = STANDARD.rows) -> tuple[Boo
         varied = np.ptp(gyro) > 0.0 and len(np.unique(gyro)) > settings.distinct
         for extreme in (held.max(), held.min()) if len(held) else ():
             at = np.concatenate([[0], (gyro == extreme).astype(np.int8), [0]])
-            edges = np.flatnonzero(np.diff(at))
-            spells = list(zip(edges[::2].tolist(), edges[1::2].tolist()))
-            longest = max(last - first for first, last in spells)
-            limit = varied and longest >= settings.saturated and not rests(longest, usual_rest(held))
-            for first, last in spells:
-                if limit and last - first >= settings.saturated:
+            spells = np.flatnonzero(np.diff(at)).reshape(-1, 2)
+            lengths = np.diff(spells)[:, 0]
+            longest = int(lengths.max())
+            if varied and longest >= settings.saturated and not rests(longest, usual_rest(held)):
+                for first, last in spells[lengths >= settings.saturated].tolist():
                     left_out["saturated"][first:last] = True
     return usable & ~left_out["saturated"], left_out
 
@@ -219,10 +218,9 @@ def _even(
 
 def _constant_columns(samples: BySample, even: Inputs, sample_s: float) -> FloatArray:
     """Response to each nominal constant on the even rows, shape (e, 8); 0 where a run can't show one."""
-    by_sample = samples.inputs(even, None)
     told = dict(nominal_columns(even))
     if np.any(even.table_rate):
-        fast = nominal_columns(by_sample)
+        fast = nominal_columns(samples.inputs(even, None))
         told |= {name: samples.means(fast[name]) for name in ("e0", "k1", "k2")}
     told["m"] = window_difference(even.time, even.temperature("T"), DELTA_WINDOW_S, 0.5 * sample_s)
     return np.column_stack([told.get(name, np.zeros(len(even.time))) for name in NAMES])

@@ -13,7 +13,7 @@ from fogml.gap.result_json import gap_values
 from fogml.gap.result_parts import (
     CauseShare,
     Compensation,
-    Counterfactual,
+    ConstantFit,
     HowFar,
     Nearest,
     Rehearsed,
@@ -21,6 +21,7 @@ from fogml.gap.result_parts import (
     WhatIf,
     Where,
 )
+from fogml.gap.step_settings import Reported
 from fogml.pictures import Panel, Pictured
 from fogml.runs.run import Run
 from fogml.twin.uncertainty import Uncertainty
@@ -158,18 +159,6 @@ class SeparatingRun:
 
 
 @dataclass(frozen=True)
-class ConstantFit:
-    """A constant of the model: prior and fitted value."""
-
-    name: str
-    unit: str
-    prior_mean: float
-    prior_sd: float
-    value: float
-    se: float
-
-
-@dataclass(frozen=True)
 class NoiseReport:
     """The noise model.
 
@@ -258,8 +247,8 @@ class Diagnosis(Pictured):
         What of it a gyro can compensate by itself.
     uncertainty
         Covariance of constants and named effects together.
-    counterfactuals
-        What each effect makes of each run, where that was asked for.
+    least_suspected
+        A cause that is not named is kept in a twin as suspected from this probability on.
     """
 
     fit: tuple[str, ...]
@@ -289,19 +278,24 @@ class Diagnosis(Pictured):
     shares: tuple[CauseShare, ...] = ()
     compensation: Compensation | None = None
     uncertainty: Uncertainty | None = None
-    counterfactuals: tuple[Counterfactual, ...] = ()
+    least_suspected: float = Reported.suspected
 
     @property
     def named(self) -> tuple[Found, ...]:
         """The effects that are named."""
         return tuple(found for found in self.found if found.named)
 
+    @property
+    def counterfactuals(self) -> tuple[RunSeries, ...]:
+        """Runs with what each effect makes of them, where that was asked for."""
+        return tuple(one for one in self.series if one.courses)
+
     def write_model(self, model: AnyModel, path: Path, runs: Sequence[Run] = ()) -> tuple[str, ...]:
         """Write the diagnosed model, constants fitted and effects added, as ``twin.yaml``.
 
         A twin has its covariance, what is suspected, and a plant fitted to `runs` besides, told in sentences.
         """
-        from fogml.gap.better_twin import better_twin
+        from fogml.gap.fitted_model import better_twin
         from fogml.twin.twin_file import save_twin
 
         noise, spread = self.noise.coefficients, self.noise.relative_se

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, is_dataclass
+from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from fogml.gap.result import Diagnosis, Found
-    from fogml.gap.result_parts import Where
+    from fogml.gap.result_parts import TemperatureExcess
 
 SCHEMA = "fogml.gap/1"
 
 
 def gap_values(found: Diagnosis) -> dict[str, Any]:
     """A diagnosis as plain values, ready for JSON."""
-    return {
+    same = ("noise", "evidence", "what_if", "nearest", "headline", "shares", "rehearsal", "compensation")
+    values = {
         "schema": SCHEMA,
         "runs": {
-            "fit": list(found.fit),
-            "held_out": list(found.held_out),
+            "fit": found.fit,
+            "held_out": found.held_out,
             "noise": found.noise_run,
             "held_out_is_part_of_last_run": found.held_out_is_part,
             "unusable": [{"run": run, "reason": reason} for run, reason in found.unusable],
@@ -30,22 +31,19 @@ def gap_values(found: Diagnosis) -> dict[str, Any]:
         "verdict": found.verdict,
         "which": [_found(f) for f in found.found],
         "suspected": [_found(f) for f in found.suspected],
-        "unknown": _plain(found.unknown),
-        "where": _where(found.where),
-        "how_far": _plain(found.how_far),
-        "undetectable": list(found.undetectable),
-        "separating_run": _plain(found.separating_run),
+        "unknown": found.unknown,
+        "where": {**vars(found.where), "temperature": [_bin(t) for t in found.where.temperature]},
+        "how_far": found.how_far,
+        "undetectable": found.undetectable,
+        "separating_run": found.separating_run,
         "constants": {
             c.name: {"value": c.value, "se": c.se, "unit": c.unit, "prior": [c.prior_mean, c.prior_sd]}
             for c in found.constants
         },
-        **{
-            name: _plain(getattr(found, name))
-            for name in ("noise", "evidence", "what_if", "nearest", "headline", "shares", "rehearsal")
-        },
-        "compensation": _plain(found.compensation),
-        "assumed": list(found.assumed),
+        **{name: getattr(found, name) for name in same},
+        "assumed": found.assumed,
     }
+    return {key: _plain(value) for key, value in values.items()}
 
 
 def _found(found: Found) -> dict[str, Any]:
@@ -53,11 +51,11 @@ def _found(found: Found) -> dict[str, Any]:
     same = ("probability", "prior_probability", "amplitude", "parameters", "stage", "by_run", "consistent")
     return {
         "effect": found.effect,
-        "class": list(found.members),
-        "left_out": list(found.left_out),
-        **{name: _plain(getattr(found, name)) for name in same},
+        "class": found.members,
+        "left_out": found.left_out,
+        **{name: getattr(found, name) for name in same},
         "grows_per_day": found.grows,
-        "onset": _plain(found.onset),
+        "onset": found.onset,
         "log_odds": None if found.log_odds is None else dict(zip(odds, found.log_odds)),
         "share": found.share,
         "place": found.place,
@@ -65,31 +63,16 @@ def _found(found: Found) -> dict[str, Any]:
     }
 
 
-def _where(where: Where) -> dict[str, Any]:
-    return {
-        "stage": _plain(where.stage),
-        "regime": _plain(where.regime),
-        "temperature": [
-            {
-                "from": t.from_degc,
-                "to": t.to_degc,
-                "excess_rms": t.excess_rms,
-                "unit": "deg/h",
-                "significant": t.significant,
-                "mean_up": t.mean_up,
-                "mean_down": t.mean_down,
-            }
-            for t in where.temperature
-        ],
-        "timescale": _plain(where.timescale),
-        "segments": _plain(where.segments),
-    }
+def _bin(found: TemperatureExcess) -> dict[str, Any]:
+    same = {name: getattr(found, name) for name in ("significant", "mean_up", "mean_down")}
+    ends = {"from": found.from_degc, "to": found.to_degc}
+    return {**ends, "excess_rms": found.excess_rms, "unit": "deg/h", **same}
 
 
 def _plain(values: Any) -> Any:
     """Dataclasses and mappings as dictionaries, tuples as lists, numpy numbers as Python's."""
     if is_dataclass(values) and not isinstance(values, type):
-        values = asdict(values)
+        values = vars(values)
     if isinstance(values, Mapping):
         return {key: _plain(value) for key, value in values.items()}
     if isinstance(values, list | tuple):

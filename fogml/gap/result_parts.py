@@ -71,6 +71,18 @@ class Where:
     segments: tuple[GapSegment, ...] = ()
 
 
+@dataclass(frozen=True)
+class ConstantFit:
+    """A constant of the model: prior and fitted value."""
+
+    name: str
+    unit: str
+    prior_mean: float
+    prior_sd: float
+    value: float
+    se: float
+
+
 WORSE = 1.05
 """Rms after over rms before from which a replay is called worse, of constants and causes alike."""
 
@@ -269,31 +281,13 @@ class Course:
 
 
 @dataclass(frozen=True, eq=False)
-class Counterfactual:
-    """A run as averages of shape (k,): recorded, replayed without any effect, and what each effect adds.
-
-    Effects are linear in their size, so that ``replayed + sum of factor * course`` is exact at any factors;
-    those that are not, as a deadband, are left out, and part of what is replayed where they act.
-    """
-
-    run: str
-    held_out: bool
-    averaging_s: float
-    time_s: FloatArray
-    temperature_degc: FloatArray
-    recorded: FloatArray
-    replayed: FloatArray
-    floor: float
-    courses: tuple[Course, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class RunSeries:
     """What a page draws of a run: averages over `averaging_s`, all of shape (k,) [deg/h] unless said.
 
     ``recorded`` is less the reference; ``gap_recalibrated`` and ``gap_after`` are recorded less replayed;
     ``rate_degc_min`` tells up and down apart. ``gyro`` and ``axis`` name the unit, ``note`` is what the run's
-    facts say of it.
+    facts say of it. ``courses``, where they were asked for, are linear in their size; what is not, as a
+    deadband, is none of them, and part of what is replayed where it acts.
     """
 
     run: str
@@ -313,6 +307,12 @@ class RunSeries:
     gyro: str | None = None
     axis: str | None = None
     note: str = ""
+    courses: tuple[Course, ...] = ()
+
+    @property
+    def replayed_bare(self) -> FloatArray:
+        """Replayed without its courses: with the sum of factor * course it is exact at any factors."""
+        return np.asarray(self.replayed_after - sum(c.values for c in self.courses if c.acts))
 
     def panel(self) -> Panel:
         """The gap over time, before and after what was found."""

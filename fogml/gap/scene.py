@@ -12,8 +12,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from fogml.arrays import FloatArray
-from fogml.gap.grids import Grids
 from fogml.gap.rows import READ, Rows
+from fogml.gap.settings import Grids
 from fogml.runs.steps import recorded_step
 from fogml.signals.bases import lag
 from fogml.twin.effect import Effect
@@ -50,6 +50,8 @@ class Scene:
         What may be named, by id.
     grids
         How closely families look.
+    constants
+        At which effects meet the output, by name.
     cache
         What several families ask for.
     """
@@ -60,6 +62,7 @@ class Scene:
     lines_hz: tuple[float, ...] = ()
     candidates: Mapping[str, Effect] = field(default_factory=dict)
     grids: Grids = field(default_factory=Grids)
+    constants: Mapping[str, float] = field(default_factory=dict)
     cache: dict[Any, Any] = field(default_factory=dict)
 
     @property
@@ -174,9 +177,8 @@ class Block(NamedTuple):
     positive: bool = False
 
 
-Constants = Mapping[str, float]
-Build = Callable[[Rows, Scene, Constants], Iterator[Block]]
-"""Blocks of one run, the same on every run of a scene, at the nominal constants."""
+Build = Callable[[Rows, Scene], Iterator[Block]]
+"""Blocks of one run, the same on every run of a scene."""
 
 
 @dataclass(frozen=True)

@@ -309,14 +309,9 @@ class Search:
         return min(float(np.sum(1.0 / (1.0 + np.exp(-np.array(odds))))), 0.5)
 
     def _log_odds(self) -> FloatArray:
-        kinds = ("known", "unknown", "plant", "left_out")
-        count = {kind: sum(f.kind == kind for f in self.families) for kind in kinds}
+        priors = self.priors
+        mass = {"known": priors.expected_causes, "unknown": priors.unknown, "plant": priors.other_plant}
+        each = {kind: m / max(sum(f.kind == kind for f in self.families), 1) for kind, m in mass.items()}
         # What is left out is as likely as any candidate.
-        count["left_out"] = count["known"] = max(count["known"], 1)
-        mass = {
-            "known": self.priors.expected_causes,
-            "left_out": self.priors.expected_causes,
-            "unknown": self.priors.unknown,
-            "plant": self.priors.other_plant,
-        }
-        return np.array([self.priors.log_odds(min(mass[f.kind] / count[f.kind], 0.5)) for f in self.families])
+        each["left_out"] = each["known"]
+        return np.array([priors.log_odds(min(each[f.kind], 0.5)) for f in self.families])

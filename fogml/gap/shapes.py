@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.gap.grids import STANDARD, Grids
+from fogml.gap.settings import STANDARD, Grids
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Grade, Quantity
 
@@ -60,7 +60,7 @@ def grid(
     grade: Grade,
     response: Response,
     spans: Mapping[str, float],
-    grids: Grids = STANDARD,
+    grids: Grids = STANDARD.grids,
 ) -> tuple[GridNode, ...]:
     """The nodes of a candidate.
 
@@ -77,26 +77,6 @@ def grid(
     grids
         How close nodes are.
     """
-    nodes = _grid(candidate, grade, response, spans, grids)
-    about = [{AT_AMPLITUDE: float(a)} for a in candidate.amplitudes] or [{}]
-    return tuple(
-        replace(node, shape={**node.shape, **at}, draws=tuple({**draw, **at} for draw in node.draws))
-        for node in nodes
-        for at in about
-    )
-
-
-def usual_shapes(candidate: Effect, grade: Grade) -> tuple[dict[str, float], ...]:
-    """Usual shapes: in the middle of their ranges, all at their lowest, all at their highest."""
-    ends = ({q.name: q.range(grade)[i] for q in candidate.shape} for i in (0, 1))
-    return (candidate.default_shape(grade), *ends)
-
-
-def _grid(
-    candidate: Effect, grade: Grade, response: Response, spans: Mapping[str, float], grids: Grids
-) -> tuple[GridNode, ...]:
-    if not candidate.shape:
-        return (GridNode({}, ({},)),)
     usual = candidate.default_shape(grade)
     turning = [q for q in candidate.shape if q.all_round]
     rest = [q for q in candidate.shape if q not in turning]
@@ -106,12 +86,12 @@ def _grid(
     axes = [_axis(q, grade, count, spans, grids) for q in bent]
     directions = {q.name: _directions(q, response, usual) for q in turning}
     points = _spread(linear, directions, grade)
+    turns = math.prod(map(len, directions.values()))
+    about = [{AT_AMPLITUDE: float(a)} for a in candidate.amplitudes] or [{}]
     nodes = []
-    for values in product(*axes):
-        shape = usual | {q.name: value for q, value in zip(bent, values)}
-        draws = tuple(shape | more for more in points)
-        turns = math.prod(map(len, directions.values()))
-        nodes.append(GridNode(shape, draws, turns))
+    for values, at in product(product(*axes), about):
+        shape = usual | {q.name: value for q, value in zip(bent, values)} | at
+        nodes.append(GridNode(shape, tuple(shape | more for more in points), turns))
     return tuple(nodes)
 
 

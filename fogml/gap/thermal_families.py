@@ -14,7 +14,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.gap.rows import Rows
-from fogml.gap.scene import Block, Constants, Place, Scene, column_block
+from fogml.gap.scene import Block, Place, Scene, column_block
 from fogml.signals.bases import bumps, lag, play, preisach, rate
 
 
@@ -46,12 +46,12 @@ def _loops(rows: Rows, scene: Scene) -> list[Block]:
     return found
 
 
-def hysteresis(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def hysteresis(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Any rate-independent loop of the bias."""
     yield from _loops(rows, scene)
 
 
-def scale_factor_hysteresis(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def scale_factor_hysteresis(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Any rate-independent loop of the scale factor."""
     for block in _loops(rows, scene):
         yield block._replace(columns=rows.per_ppm[:, None] * block.columns)
@@ -62,7 +62,7 @@ def _switched_on(rows: Rows) -> bool:
     return math.isfinite(rows.even.powered_on_s) or bool(rows.even.power_ons_s)
 
 
-def warm_up(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def warm_up(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Any decay since power-on."""
     if _switched_on(rows):
         yield column_block(*(rows.of(rows.even.unwarmed(tau)) for tau in scene.grids.warm_ups_s))
@@ -70,7 +70,7 @@ def warm_up(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
         yield Block(np.zeros((len(rows), len(scene.grids.warm_ups_s))))
 
 
-def polarization(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def polarization(rows: Rows, scene: Scene) -> Iterator[Block]:
     """A wave over the optics' temperature, of any phase."""
     grids, span = scene.grids, scene.span_degc
     fastest, slowest = (1.0 / period for period in grids.periods_degc)
@@ -84,7 +84,7 @@ def polarization(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Blo
             yield Block(np.column_stack([np.sin(angle), np.cos(angle)]), shape, place.weight)
 
 
-def transition(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def transition(rows: Rows, scene: Scene) -> Iterator[Block]:
     """A step over temperature where a polymer turns, and the peak of its response to a rate there."""
     low, high = scene.range_degc
     centres = np.arange(low - 2.5, high + 2.6, scene.grids.transition_step_degc)
@@ -111,7 +111,7 @@ def _two_lags(rows: Rows, places: list[Place], lags_s: tuple[float, ...], sign: 
             yield column_block(behind[one], behind[other], time_constant=one, place=place.name)
 
 
-def hidden_node(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def hidden_node(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Places that lag behind what is recorded."""
     places = scene.coil(rows)
     if any(scene.records("T_chamber")):
@@ -119,12 +119,12 @@ def hidden_node(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Bloc
     yield from _two_lags(rows, places, scene.grids.node_lags_s, 1.0)
 
 
-def relaxation(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def relaxation(rows: Rows, scene: Scene) -> Iterator[Block]:
     """What decays after a change of temperature."""
     yield from _two_lags(rows, scene.coil(rows), scene.grids.relaxations_s, -1.0)
 
 
-def rate_product(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def rate_product(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Temperature times its rate, and what a slope that is not straight adds."""
     time = rows.even.time
     for place in scene.coil(rows):
@@ -136,7 +136,7 @@ def rate_product(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Blo
             yield column_block(product, 0.012 * rows.of(u) * product, place=place.name)
 
 
-def rate_of_temperature(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def rate_of_temperature(rows: Rows, scene: Scene) -> Iterator[Block]:
     """A response to the rate of temperature that itself depends on temperature."""
     for place in scene.coil(rows):
         u, speed = place.temperature - 25.0, rate(rows.even.time, place.temperature)
@@ -145,7 +145,7 @@ def rate_of_temperature(rows: Rows, scene: Scene, constants: Constants) -> Itera
         yield column_block(*(rows.of(speed * c) for c in powers), place=place.name)
 
 
-def shupe(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def shupe(rows: Rows, scene: Scene) -> Iterator[Block]:
     """The rate of the difference between the faces of the winding, and between can and winding."""
     inner, outer = rows.even.temperature("T_in"), rows.even.temperature("T_out")
     difference = outer - inner
@@ -156,7 +156,7 @@ def shupe(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
         yield column_block(faces, cans, lag=late)
 
 
-def static(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def static(rows: Rows, scene: Scene) -> Iterator[Block]:
     """A function of temperature that a parabola does not hold."""
     low, high = scene.range_degc
     for place in scene.coil(rows):
@@ -166,7 +166,7 @@ def static(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
         yield Block(bumps(x, low, high, 9), {"place": place.name})
 
 
-def ageing(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def ageing(rows: Rows, scene: Scene) -> Iterator[Block]:
     """A drift with the unit's own time, from run to run."""
     begun = scene.begun_s[scene.runs.index(rows)]
     hours = np.maximum(rows.time_s + begun, 0.0) / 3600.0
@@ -175,7 +175,7 @@ def ageing(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
         yield column_block(np.log1p(3600.0 * hours / tau), time_constant=tau)
 
 
-def scale_factor_node(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def scale_factor_node(rows: Rows, scene: Scene) -> Iterator[Block]:
     """A scale factor that follows the temperature of a node at or near a place, or any curve of it."""
     speed, grids = rows.per_ppm[:, None], scene.grids
     for place in scene.optics(rows, grids.electronics_mixes):
@@ -187,7 +187,7 @@ def scale_factor_node(rows: Rows, scene: Scene, constants: Constants) -> Iterato
         yield Block(speed * bumps(x, *scene.range_degc, 5), shape, 0.3 * place.weight)
 
 
-def modulator(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def modulator(rows: Rows, scene: Scene) -> Iterator[Block]:
     """A scale factor that follows the modulator's temperature, with a second loop that corrects it late."""
     speed, lags_s = rows.per_ppm[:, None], scene.grids.modulator_s
     on = _switched_on(rows)
@@ -201,7 +201,7 @@ def modulator(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]
             yield Block(columns, {"place": place.name, **how}, place.weight)
 
 
-def leads(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def leads(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Rates of the places that the leads pass, less the coil's."""
     time, (coil_s, case_s) = rows.even.time, scene.grids.lead_lags_s
     coil = 0.5 * (rows.even.temperature("T_in") + rows.even.temperature("T_out"))

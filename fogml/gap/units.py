@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import softmax
 
 from fogml.errors import InputError
 from fogml.gap.cards import in_form, replaced
@@ -133,20 +134,19 @@ def diagnose_units(
     several = next((u for u, runs in static.items() if len(runs) > 1), None)
     if several is not None:
         raise InputError(f"unit {several} has several noise runs; one of each unit is enough")
+    quiet = {unit: runs[0] for unit, runs in static.items()}
     found: dict[str, Inference] = {}
     for unit, runs in units.items():
-        quiet = static[unit][0] if unit in static else None
         tell(f"unit {unit}")
-        own = inferred(model, runs, held.get(unit, ()), quiet, without, priors, tell)
+        own = inferred(model, runs, held.get(unit, ()), quiet.get(unit), without, priors, tell)
         found[unit] = own.put_away() if len(units) > 1 else own
         release()
     told = {unit: _Told(f) for unit, f in found.items()}
     by_unit = {}
     for unit, f in found.items():
         others = [t for u, t in told.items() if u != unit]
-        quiet = static[unit][0] if unit in static else None
         shared = replace(f, shared=_by_others(others, told[unit]))
-        by_unit[unit] = answered(shared, quiet, unit not in held, seed, cost_of_false_name)
+        by_unit[unit] = answered(shared, quiet.get(unit), unit not in held, seed, cost_of_false_name)
         release()
     return UnitsDiagnosis(by_unit, _shared(by_unit, list(told.values())))
 
@@ -228,9 +228,7 @@ def _by_others(others: Sequence[_Told], own: _Told) -> Callable[[frozenset[str]]
 def _shared(by_unit: dict[str, Diagnosis], told: Sequence[_Told]) -> tuple[SharedCause, ...]:
     priors = told[0].found.setting.priors
     sets = sorted({names for t in told for names in t.sets}, key=sorted)
-    scores = np.array([_prior(told, names) + sum(t.score(names) for t in told) for names in sets])
-    weights = np.exp(scores - scores.max())
-    weights /= weights.sum()
+    weights = softmax([_prior(told, names) + sum(t.score(names) for t in told) for names in sets])
     causes = []
     for id in sorted({f.effect for d in by_unit.values() for f in d.found}):
         acts = float(sum(w for w, names in zip(weights, sets) if id in names))

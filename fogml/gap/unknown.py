@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from fogml.arrays import FloatArray
-from fogml.gap.grids import Grids
 from fogml.gap.rows import READ, READ_GROUPS, Rows, slopes, through_nominal
-from fogml.gap.scene import Block, Build, Constants, Family, Scene
+from fogml.gap.scene import Block, Build, Family, Scene
+from fogml.gap.settings import Grids
 from fogml.signals.bases import bumps, decayed, lag, play, rate
 from fogml.twin.registry import effects
 
@@ -25,7 +25,7 @@ def _begun(place: FloatArray, count: int) -> FloatArray:
     return (place[:, None] >= (np.arange(count) + 1.0) / (count + 1.0)).astype(np.float64)
 
 
-def _smooth(half_period_s: float, rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _smooth(half_period_s: float, rows: Rows, scene: Scene) -> Iterator[Block]:
     span = float(rows.end_s[-1] - rows.end_s[0]) + rows.row_s
     longest = max(float(r.end_s[-1] - r.end_s[0]) + r.row_s for r in scene.fit)
     slower = [s for s in scene.grids.smooth_s if s > half_period_s]
@@ -36,24 +36,24 @@ def _smooth(half_period_s: float, rows: Rows, scene: Scene, constants: Constants
     yield Block(np.cos(phase[:, None] * np.arange(1, count + 1)))
 
 
-def _steps(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _steps(rows: Rows, scene: Scene) -> Iterator[Block]:
     place, single = np.arange(len(rows)) / len(rows), min(scene.grids.single_steps, scene.most_of_own)
     yield Block(_begun(place, min(scene.grids.steps, scene.most_of_own)))
     for i, step in enumerate(_begun(place, single).T):
         yield Block(step[:, None], {"at": (i + 1.0) / (single + 1.0)}, 1.0 / single)
 
 
-def _temperature(count: int, rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _temperature(count: int, rows: Rows, scene: Scene) -> Iterator[Block]:
     yield Block(bumps(rows.temperature, *scene.range_degc, count))
 
 
-def _rate(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _rate(rows: Rows, scene: Scene) -> Iterator[Block]:
     speed = rows.of(rate(rows.even.time, rows.even.temperature("T")))[:, None]
     yield Block(speed * bumps(rows.temperature, *scene.range_degc, 9))
     yield Block(np.abs(speed) * bumps(rows.temperature, *scene.range_degc, 5))
 
 
-def _direction(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _direction(rows: Rows, scene: Scene) -> Iterator[Block]:
     yield Block(_way(rows, scene)[:, None] * bumps(rows.temperature, *scene.range_degc, 9))
 
 
@@ -63,7 +63,7 @@ def _way(rows: Rows, scene: Scene) -> FloatArray:
     return np.asarray(np.tanh(speed / scene.grids.direction_degc_min))
 
 
-def _past(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _past(rows: Rows, scene: Scene) -> Iterator[Block]:
     time, x = rows.even.time, rows.even.temperature("T")
     low, high = scene.range_degc
     lags = [rows.of(lag(time, x, s)) for s in scene.grids.past_s]
@@ -76,7 +76,7 @@ def _past(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     yield Block(np.column_stack([rows.of(lag(time, level, s)) for level in levels for s in creeps_s]))
 
 
-def _events(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _events(rows: Rows, scene: Scene) -> Iterator[Block]:
     """What turns of the temperature, starts and ends of its moves leave behind, and how it heals."""
     time, x, grids = rows.even.time, rows.even.temperature("T"), scene.grids
     ways = np.sign(np.diff(play(x, grids.turn_degc), prepend=x[0]))
@@ -93,7 +93,7 @@ def _events(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     yield Block(rows.of(np.column_stack([decayed(time, kicks, s) for s in grids.heals_s])))
 
 
-def _differences(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _differences(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Any function of how much warmer one place is than another, at once or late."""
     for i, (one, other) in enumerate(BETWEEN):
         ends = ("differences", i)
@@ -107,7 +107,7 @@ def _differences(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Blo
         yield Block(rows.of(np.column_stack([levels, *late])))
 
 
-def _excursion(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _excursion(rows: Rows, scene: Scene) -> Iterator[Block]:
     x = rows.even.temperature("T")
     low, high = scene.range_degc
     most, least = rows.of(np.maximum.accumulate(x)), rows.of(np.minimum.accumulate(x))
@@ -117,7 +117,7 @@ def _excursion(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block
     yield Block(np.column_stack([rows.of(turns.astype(float)), rows.of(travelled)]))
 
 
-def _table(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _table(rows: Rows, scene: Scene) -> Iterator[Block]:
     speed = rows.of(rows.even.table_rate)
     most = max(float(np.abs(r.even.table_rate).max(initial=0.0)) for r in scene.runs)
     levels = bumps(speed, -most, most, 9) if most > 0.0 else np.zeros((len(rows), 9))
@@ -139,7 +139,7 @@ def _table(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     yield Block(np.column_stack([net, travelled, *(np.tanh(net / s) for s in (0.3, 1.0, 3.0))]))
 
 
-def _recorded(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _recorded(rows: Rows, scene: Scene) -> Iterator[Block]:
     # Quantities that candidates follow: what goes with them is theirs, in whatever form.
     theirs = {name for declared in effects().values() if declared.candidate for name in declared.needs}
     for name in sorted(set.intersection(*(set(r.even.drives) for r in scene.runs)) - theirs):
@@ -147,7 +147,7 @@ def _recorded(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]
         yield Block(np.column_stack([rows.of(lag(rows.even.time, values, s)) for s in (0.0, 300.0, 1800.0)]))
 
 
-def _between(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _between(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Constants that changed between one run and the next: each alone, or all of them."""
     begun = scene.begun_s[scene.runs.index(rows)]
     every = np.concatenate([r.constants for r in scene.fit])
@@ -161,7 +161,7 @@ def _between(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
             yield Block(column[:, None], held, weight / columns.shape[1])
 
 
-def _lines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _lines(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Lines that stand out: steady, while the table turns, as temperature or time make them strong."""
     time, weight = rows.time_s, scene.grids.line_weight
     phase = np.pi * (time - time[0]) / max(float(time[-1] - time[0]), 1.0)
@@ -182,7 +182,7 @@ def _lines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
             yield Block(np.concatenate([s[:, None] * waves for s in any_of], axis=1), held, weight)
 
 
-def _start(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _start(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Any course since power-on, or since the run began where that is not known, at its own pace."""
     on = rows.even.powered_on_s
     since = rows.time_s - (on if math.isfinite(on) else float(rows.even.time[0]))
@@ -190,16 +190,16 @@ def _start(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     yield Block(bumps(np.log10(np.maximum(since, first)), math.log10(first), math.log10(last), 8))
 
 
-def _readings(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _readings(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Errors of thermometers that go with temperature, its direction or its past: the same on every run."""
     of_all = {n: _of_temperature(rows, scene, n) for n in READ if n in rows.readings}
     widths = (10, 5, 15, *(1 for _ in 2 * scene.grids.slack_degc))
     for group in (*READ_GROUPS, READ):
         of_each = {n: kinds for n, kinds in of_all.items() if n in group}
-        yield from map(Block, _through(rows, constants, of_each, widths))
+        yield from map(Block, _through(rows, scene, of_each, widths))
 
 
-def _readings_in_time(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+def _readings_in_time(rows: Rows, scene: Scene) -> Iterator[Block]:
     """Errors of thermometers that wander, or go in steps, in a run's own time."""
     grids = scene.grids
     place = np.arange(len(rows.even.time)) / len(rows.even.time)
@@ -210,7 +210,7 @@ def _readings_in_time(rows: Rows, scene: Scene, constants: Constants) -> Iterato
     widths = tuple(kind.shape[1] for kind in kinds)
     for group in READ_GROUPS:
         of_each = {n: kinds for n in group if n in rows.readings}
-        for i, columns in enumerate(_through(rows, constants, of_each, widths)):
+        for i, columns in enumerate(_through(rows, scene, of_each, widths)):
             yield Block(columns, weight=1.0 if i < 2 else 1.0 / singles)
 
 
@@ -228,10 +228,10 @@ def _of_temperature(rows: Rows, scene: Scene, name: str) -> list[FloatArray]:
 
 
 def _through(
-    rows: Rows, constants: Constants, of_each: Mapping[str, list[FloatArray]], widths: tuple[int, ...]
+    rows: Rows, scene: Scene, of_each: Mapping[str, list[FloatArray]], widths: tuple[int, ...]
 ) -> Iterator[FloatArray]:
     """Kinds of errors of a group's readings, each through the nominal, shape (m, k); 0 without a reading."""
-    told = slopes(rows, constants)
+    told = slopes(rows, scene.constants)
     for i, width in enumerate(widths):
         errors = {name: kinds[i] for name, kinds in of_each.items()}
         yield through_nominal(rows, told, errors) if errors else np.zeros((len(rows), width))

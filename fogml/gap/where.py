@@ -67,16 +67,9 @@ def averages(rows: Rows, averaging_s: float = Reported.averaging_s) -> Averages:
 
 @dataclass(frozen=True, eq=False)
 class GapOnRun:
-    """The structural gap of a fit run, shape (m,) [deg/h] each.
+    """The structural gap of a fit run, and the part of it that effects found and the unknown make up.
 
-    Attributes
-    ----------
-    rows
-        The run.
-    gap
-        Recorded less recalibrated replay.
-    systematic
-        The part of it that effects found and the unknown make up, noise-free.
+    Both have shape (m,) [deg/h]; the gap is recorded less recalibrated replay, the part has no noise.
     """
 
     rows: Rows

@@ -10,7 +10,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport
+from fogml.gap.result import CandidateEvidence, Found, NoiseReport
+from fogml.gap.result_parts import ConstantFit
 from fogml.intervals import Z90, Z95
 from fogml.numerals import number, unit_words, with_error
 from fogml.report import style

@@ -17,7 +17,7 @@ from fogml.blind.folders import CaseFiles
 from fogml.blind.methods import diagnosis
 from fogml.escaping import script_data
 from fogml.gap.result import Diagnosis
-from fogml.gap.result_parts import Counterfactual
+from fogml.gap.result_parts import RunSeries
 from fogml.numerals import averages, duration, listed, number, plural, unit_words
 from fogml.report import (
     figures_gap,
@@ -235,7 +235,7 @@ def counterfactual_page(found: Diagnosis) -> str:
     found
         As :func:`fogml.gap.diagnose` gives it with ``courses=True``.
     """
-    runs = sorted(found.counterfactuals, key=lambda run: not run.held_out)
+    runs = sorted(found.counterfactuals, key=lambda run: run.role == "fit")
     sliders = _sliders(found, runs)
     data = {"runs": [_packed(run) for run in runs]}
     return render(
@@ -243,7 +243,7 @@ def counterfactual_page(found: Diagnosis) -> str:
         title=f"{subject_of(found)} – what if?",
         name=subject_of(found),
         kicker=f"The twin “{found.model}” against recordings, with effects of any size",
-        runs=[f"{run.run} ({'held out' if run.held_out else 'fitted on'})" for run in runs],
+        runs=[f"{run.run} ({'held out' if run.role == 'held_out' else 'fitted on'})" for run in runs],
         acting=[s for s in sliders if s["start"]],
         others=[s for s in sliders if not s["start"]],
         drawing=_drawing(runs[0]),
@@ -253,7 +253,7 @@ def counterfactual_page(found: Diagnosis) -> str:
     )
 
 
-def _sliders(found: Diagnosis, runs: Sequence[Counterfactual]) -> list[dict[str, Any]]:
+def _sliders(found: Diagnosis, runs: Sequence[RunSeries]) -> list[dict[str, Any]]:
     """Of every effect that some run shows: those that act first, then those that hold most of the gap.
 
     Each with its name, the size that 1 stands for, where it begins and ends.
@@ -277,7 +277,7 @@ def _sliders(found: Diagnosis, runs: Sequence[Counterfactual]) -> list[dict[str,
     ]
 
 
-def _packed(run: Counterfactual) -> dict[str, Any]:
+def _packed(run: RunSeries) -> dict[str, Any]:
     """A run's courses as base64 of float32, which holds seven digits."""
 
     def packed(values: np.ndarray) -> str:
@@ -288,22 +288,21 @@ def _packed(run: Counterfactual) -> dict[str, Any]:
         "time": packed((run.time_s - run.time_s[0]) / 3600.0),
         "temperature": packed(run.temperature_degc),
         "recorded": packed(run.recorded),
-        "replayed": packed(run.replayed),
+        "replayed": packed(run.replayed_bare),
         "courses": {course.effect: packed(course.values) for course in run.courses},
     }
 
 
-def _drawing(run: Counterfactual) -> Drawing:
+def _drawing(run: RunSeries) -> Drawing:
     """Temperature, recorded with replayed, and the gap, as the sliders begin."""
     hours = (run.time_s - run.time_s[0]) / 3600.0
-    replayed = run.replayed + sum(c.values for c in run.courses if c.acts)
     panels = {"T [°C]": 0.7, "error [deg/h]": 1.4, "gap [deg/h]": 1.2}
     figure = style.stacked(panels, "time [h]", 0.05, title_font_size=12)
     for row, values, name, colour, width, dash in (
         (1, run.temperature_degc, "temperature", style.BLUE, 1.6, None),
         (2, run.recorded, "recorded", style.BEFORE, 1.3, None),
-        (2, replayed, "replayed", style.MODEL, 2.0, "dash"),
-        (3, run.recorded - replayed, "gap", style.AFTER, 1.3, None),
+        (2, run.replayed_after, "replayed", style.MODEL, 2.0, "dash"),
+        (3, run.gap_after, "gap", style.AFTER, 1.3, None),
     ):
         figure.add_trace(style.line(hours, values, name, colour, width, dash), row=row, col=1)
     style.styled(figure, 560, legend={"y": 1.06}, hovermode="x")

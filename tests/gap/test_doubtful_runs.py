@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fogml.gap.doubtful_runs import other_way
-from fogml.gap.reports import assumed
+from fogml.gap.sentences import assumed, other_way
 from fogml.runs.checks import check_run
 from fogml.runs.run import Run
 

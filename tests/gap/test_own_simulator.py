@@ -8,6 +8,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.gap.diagnosis import diagnose
 from fogml.gap.model import Constant, EffectValue, NoisePrior
+from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.programme import programme_from
@@ -130,8 +131,9 @@ def _shares(found):
 
 def test_constants_that_changed_between_two_runs_and_a_noisier_held_out_run():
     runs = made_runs(offsets=(1.5, 2.6, 2.6), noisier=3.0)
-    found = diagnose(Simulator(offered=("creep",)), runs[:2], runs[2:], plan=False)
-    assert found.verdict == "unknown"
+    priors = replace(STANDARD, reported=replace(STANDARD.reported, suspected=0.2))
+    found = diagnose(Simulator(offered=("creep",)), runs[:2], runs[2:], plan=False, priors=priors)
+    assert found.verdict == "unknown" and found.least_suspected == 0.2
     assert found.unknown.looks_like == "comes of constants that changed between two runs, a and b"
     (far,) = found.how_far
     assert "white noise of this run is" in far.note

@@ -11,8 +11,7 @@ from fogml.errors import InputError
 from fogml.gap.planning.fisher import covariance, expected, information, merit, responses, unknowns
 from fogml.gap.planning.plan import plan_runs
 from fogml.gap.planning.plan_result import plan_values
-from fogml.gap.planning.programme_design import Design
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_family import Design, Family
 from fogml.gap.planning.rehearsal import FINE_S, Rehearsal, Together, stage
 from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts

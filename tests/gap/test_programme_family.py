@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
-from fogml.gap.planning.programme_design import LADDERS, RAMP_RATES, SOAKS_S, Design
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_family import LADDERS, RAMP_RATES, SOAKS_S, Design, Family
 from fogml.gap.planning.programme_search import search
 from fogml.twin.programme import programme_from
 

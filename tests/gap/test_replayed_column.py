@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from fogml.runs.run import Run
 from fogml.twin.replay import replay
 from fogml.twin.simulate import simulate
 from fogml.twin.twin_file import load_twin
+from tests.report.diagnoses import series
 
 STEPS = ["soak at 20 degC for 30 min", "ramp to 50 degC at 1 degC/min", "soak at 50 degC for 30 min"]
 
@@ -45,23 +46,22 @@ def test_the_gap_is_recorded_less_the_column():
 
 
 def test_averages_of_a_replay_are_moved_by_what_the_column_is_apart():
-    @dataclass(frozen=True)
-    class Averages:
-        run: str
-        averaging_s: float
-        time_s: np.ndarray
-        recorded: np.ndarray
-        replayed: np.ndarray
-
     runs = [run(1), run(2)]
     told = by_column(load_twin("nominal"), runs[:1], runs[1:])
     centres = np.array([300.0, 900.0, 3300.0, 5000.0])
-    shown = told._moved(Averages("r1", 600.0, centres, centres * 0.0, centres * 0.0), ("replayed",))
+    none = np.zeros(4)
+    replays = ("replayed_before", "replayed_recalibrated", "replayed_after")
+    still = dict.fromkeys(("recorded", *replays, "gap_recalibrated", "gap_after"), none)
+    given = replace(series("r1"), averaging_s=600.0, time_s=centres, **still)
+    shown = told._moved(given)
     apart = runs[0].columns["replayed"] - replay(told.model.twin, runs[0])
     time = runs[0].time
     within = [(time >= centre - 300.0) & (time < centre + 300.0) for centre in centres]
-    np.testing.assert_allclose(shown.replayed, [apart[rows].mean() for rows in within], atol=1e-12)
-    assert not shown.recorded.any()
+    for name in ("recorded", *replays):
+        moved = getattr(shown, name)
+        np.testing.assert_allclose(moved, [apart[rows].mean() for rows in within], atol=1e-12)
+    # What is recorded less replayed stays.
+    assert not shown.gap_recalibrated.any() and not shown.gap_after.any()
 
 
 def test_runs_that_have_it_and_runs_that_do_not_are_refused():

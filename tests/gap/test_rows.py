@@ -12,9 +12,9 @@ from fogml.gap.frame import setting_of
 from fogml.gap.model import TwinModel
 from fogml.gap.own_simulator import candidates_of
 from fogml.gap.reading import rows_of
-from fogml.gap.reports import assumed
-from fogml.gap.result import ConstantFit
+from fogml.gap.result_parts import ConstantFit
 from fogml.gap.scene import Family, Scene, steps_are_coarse
+from fogml.gap.sentences import assumed
 from fogml.gap.settings import Priors
 from fogml.gap.thermal_families import hidden_node, warm_up
 from fogml.runs.facts import Facts
@@ -82,7 +82,7 @@ def test_a_power_cycle_of_a_unit_that_was_warm_starts_its_warm_up():
     run = Run.from_columns("a", **made.columns, power=np.where(on, 3.0, 0.0))
     rows = rows_of(run, load_twin("nominal"), 600)
     grids = Priors().grids
-    (block,) = warm_up(rows, SimpleNamespace(grids=grids), {})
+    (block,) = warm_up(rows, SimpleNamespace(grids=grids))
     since = rows.end_s - 0.5 * rows.row_s - 8600.0
     later = since > rows.row_s
     for tau, column in zip(grids.warm_ups_s, block.columns.T, strict=True):
@@ -144,7 +144,7 @@ def test_no_cause_follows_the_noise_of_a_recorded_rate_of_a_table_that_rests():
     dead_zone = effect("deadband")
     assert not np.any(rows.response(dead_zone, dead_zone.default_shape("tactical")))
     (bent,) = (f for f in families_of(twin, scene) if f.id == "sf_nonlinearity")
-    assert not any(np.any(block.columns) for block in bent.build(rows, scene, {}))
+    assert not any(np.any(block.columns) for block in bent.build(rows, scene))
     # Of a table that turns it does.
     turned = rows_of(run.with_columns(rate=np.where(run.time > 5000.0, 1.0, 0.0)), twin, 600)
     assert turned.turns and np.any(turned.response(dead_zone, dead_zone.default_shape("tactical")))
@@ -181,7 +181,7 @@ def test_a_constant_far_off_that_hardly_shows_is_told_by_the_prior_that_its_colu
 def test_what_each_run_draws_anew_has_columns_of_its_own():
     scene = _scene(_cycle("a"), _cycle("b", seed=2))
     family = Family("turn_on_bias", "known", power_cycles, drawn_per_run=True)
-    one, other = Columns.of([family], scene, {}).by_run
+    one, other = Columns.of([family], scene).by_run
     assert one.shape[1] == other.shape[1] == 2
     np.testing.assert_array_equal(one, np.column_stack([np.ones(len(one)), np.zeros(len(one))]))
     np.testing.assert_array_equal(other, np.column_stack([np.zeros(len(other)), np.ones(len(other))]))
@@ -235,7 +235,9 @@ def test_what_one_run_alone_records_keeps_its_place_beside_runs_that_do_not(poor
     alone, beside = (_scene(*runs) for runs in ((rich,), (poor, rich) if poor_first else (rich, poor)))
     for build in (moisture, machines, hidden_node, other_plant):
         family = Family("any", "known", build)
-        held, both = (Columns.of([family], scene, {"k1": 0.01}) for scene in (alone, beside))
+        held, both = (
+            Columns.of([family], replace(scene, constants={"k1": 0.01})) for scene in (alone, beside)
+        )
         own = both.by_run[1 if poor_first else 0]
         # Beside a run that records no machine a line may be one, which comes first.
         np.testing.assert_allclose(own[:, own.shape[1] - held.by_run[0].shape[1] :], held.by_run[0])

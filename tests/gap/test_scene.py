@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fogml.gap.grids import Grids
 from fogml.gap.scene import Scene, outstanding_lines
+from fogml.gap.settings import Grids
 from fogml.gap.unknown import unknown_families
 
 
@@ -85,7 +85,7 @@ def test_what_is_in_a_runs_own_time_costs_no_more_than_its_rows(
 ) -> None:
     held: Any = Scene(tuple(_OfLength(count, row_s) for _ in range(runs)), runs, "tactical")  # type: ignore[arg-type]
     drawn = {f.id: f for f in unknown_families(Grids()) if f.id == "steps" or f.id.startswith("time_")}
-    blocks = {id: list(f.build(held.runs[0], held, {})) for id, f in drawn.items()}
+    blocks = {id: list(f.build(held.runs[0], held)) for id, f in drawn.items()}
     widest = {id: max(b.columns.shape[1] for b in own) for id, own in blocks.items() if own}
     assert runs * max(widest.values()) <= runs * count / 4.0
     assert count * row_s / max(w for id, w in widest.items() if id != "steps") == pytest.approx(

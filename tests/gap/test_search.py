@@ -16,6 +16,7 @@ from fogml.gap.how_far import Foretold
 from fogml.gap.inference import infer, over_noises
 from fogml.gap.model import TwinModel, with_effects
 from fogml.gap.planning import next_run as ahead
+from fogml.gap.planning.rehearsal import _most_likely
 from fogml.gap.posterior import _likeliest, judge
 from fogml.gap.reports import STAGES
 from fogml.gap.result import Estimate
@@ -232,9 +233,7 @@ def test_what_an_event_leaves_heals_in_its_time():
 def test_each_unknown_gives_the_same_blocks_on_every_run(found):
     scene: Scene = found.setting.scene
     for family in unknown_families(STANDARD.grids):
-        widths = [
-            [b.columns.shape[1] for b in family.build(r, scene, found.setting.values)] for r in scene.runs
-        ]
+        widths = [[b.columns.shape[1] for b in family.build(r, scene)] for r in scene.runs]
         assert widths[0] == widths[1]
 
 
@@ -260,7 +259,7 @@ def test_an_unknown_of_the_angle_is_told_where_the_table_turns_or_the_angle_is_r
     rows = Turning()
     scene = SimpleNamespace(runs=[rows], span_degc=50.0)
     (family,) = (f for f in unknown_families(STANDARD.grids) if f.id == "table")
-    harmonics = list(family.build(rows, scene, {}))[4].columns
+    harmonics = list(family.build(rows, scene))[4].columns
     assert harmonics[:, 0] == pytest.approx(np.sin(np.radians(angle)))
     assert harmonics[:, 5] == pytest.approx(np.cos(3.0 * np.radians(angle)))
 
@@ -343,13 +342,13 @@ def test_a_rehearsal_names_beside_something_unknown_that_holds_more():
     """Of sets of two as of one: a class is as likely as all sets that hold it."""
     search = SimpleNamespace(priors=STANDARD, families_of=lambda kind: [0, 1])
     alone = {frozenset(): 0.0, frozenset({0}): 40.0, frozenset({1}): 20.0, frozenset({2}): 90.0}
-    likeliest, probability = ahead._most_likely(search, alone, 1.0)
+    likeliest, probability = _most_likely(search, alone, 1.0)
     assert likeliest == [0] and probability < 0.01
     pairs = alone | {frozenset({0, 2}): 130.0, frozenset({2, 3}): 100.0}
-    likeliest, probability = ahead._most_likely(search, pairs, 1.0)
+    likeliest, probability = _most_likely(search, pairs, 1.0)
     assert likeliest == [0] and probability > 0.8
-    assert ahead._most_likely(search, pairs, 1e6)[1] < 0.5
-    assert ahead._most_likely(search, {frozenset(): 0.0, frozenset({2}): 5.0}, 1.0) == ([], 0.0)
+    assert _most_likely(search, pairs, 1e6)[1] < 0.5
+    assert _most_likely(search, {frozenset(): 0.0, frozenset({2}): 5.0}, 1.0) == ([], 0.0)
 
 
 def test_what_is_put_away_finds_the_same(found):

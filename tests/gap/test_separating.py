@@ -11,8 +11,7 @@ import yaml
 
 from fogml.errors import InputError
 from fogml.gap.model import EffectValue
-from fogml.gap.planning.programme_design import Design
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_family import Design, Family
 from fogml.gap.planning.rehearsal import Rehearsal, stage
 from fogml.gap.planning.separating import LEAST_DISTANCE, _gain, distances, members_of, separating_run
 from fogml.runs.facts import Facts

@@ -10,11 +10,10 @@ import yaml
 
 from fogml.gap.model import EffectValue
 from fogml.gap.planning.fisher import usual_value
-from fogml.gap.planning.programme_design import Design
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.next_run import lengths, showing_run
+from fogml.gap.planning.programme_family import Design, Family
 from fogml.gap.planning.rehearsal import Rehearsal, stage
 from fogml.gap.planning.separating import LEAST_DISTANCE, distances, members_of
-from fogml.gap.planning.showing import lengths, showing_run
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.programme import load_programme

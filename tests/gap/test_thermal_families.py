@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fogml.gap.grids import Grids
+from fogml.gap.settings import Grids
 from fogml.gap.thermal_families import polarization, transition
 from fogml.signals.bases import bumps, preisach, relays
 from fogml.signals.recursions import play_kernel
@@ -71,7 +71,7 @@ def test_the_peak_of_a_transition_is_its_steps_rate():
     rows = SimpleNamespace(of=lambda values: values, even=SimpleNamespace(time=time))
     place = SimpleNamespace(temperature=temperature, name="coil")
     scene = SimpleNamespace(grids=Grids(), range_degc=(5.0, 45.0), coil=lambda rows: [place])
-    for block in transition(rows, scene, None):
+    for block in transition(rows, scene):
         step, peak = block.columns[:, 0], block.columns[:, 1]
         expected = 60.0 * np.gradient(step, time) * block.shape["width"]
         np.testing.assert_allclose(peak[1:-1], expected[1:-1], atol=2e-3 * np.abs(peak).max())
@@ -83,7 +83,7 @@ def test_waves_over_temperature_go_from_the_longest_period_on_a_step_apart():
     rows = SimpleNamespace(of=lambda values: values)
     place = SimpleNamespace(temperature=temperature, name="optics", weight=0.0)
     scene = SimpleNamespace(grids=grids, span_degc=40.0, optics=lambda rows: [place])
-    blocks = list(polarization(rows, scene, None))
+    blocks = list(polarization(rows, scene))
     cycles = np.array([1.0 / block.shape["period"] for block in blocks])
     assert 1.0 / cycles[0] == max(grids.periods_degc) and 1.0 / cycles[-1] >= min(grids.periods_degc) - 1e-9
     assert np.diff(cycles) * 40.0 == pytest.approx(np.full(len(cycles) - 1, np.diff(cycles)[0] * 40.0))

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from fogml.gap.better_twin import _courses
 from fogml.gap.model import EffectValue, NoisePrior, TwinModel
 from fogml.gap.own_simulator import candidates_of
+from fogml.gap.reports import _courses
 from fogml.gap.where import averages
 from fogml.twin.registry import effect
 from fogml.twin.twin_file import load_twin, save_twin
+from tests.report.diagnoses import diagnosis, hysteresis
 
 TWIN = load_twin("nominal").with_nominal(b0=1.0, e0=100.0)
 VALUES = {"b0": 1.0, "e0": 100.0}
@@ -41,6 +43,16 @@ def test_values_beyond_what_is_physical_are_written_within_it(tmp_path):
 class Parted(SimpleNamespace):
     def __len__(self):
         return len(self.time_s)
+
+
+def test_what_is_suspected_in_a_twin_is_as_likely_as_was_asked_for(tmp_path):
+    """Of a diagnosis whose settings ask for more, less is kept."""
+    twin = load_twin("nominal")
+    found = diagnosis("unknown", suspected=(hysteresis(probability=0.1),))
+    for least, kept in ((0.05, ["thermal_hysteresis"]), (0.2, [])):
+        path = tmp_path / f"{least}.yaml"
+        replace(found, least_suspected=least).write_model(TwinModel(twin), path)
+        assert list(load_twin(path).suspected) == kept
 
 
 def test_windows_keep_off_gaps_and_are_whole():
@@ -73,5 +85,6 @@ def test_what_is_out_of_proportion_to_its_size_has_no_slider():
     )
     after = SimpleNamespace(of_cause=lambda run, cause: 2.0 * np.ones(3))
     named = [SimpleNamespace(ids=("shupe_mohr",))]
-    courses = _courses(found, after, named, {"shupe_mohr": 0.5}, 0)
+    fit = SimpleNamespace(foretold=after, effects=[SimpleNamespace(id="shupe_mohr", amplitude=0.5)])
+    courses = _courses(found, fit, named, 0)
     assert [(c.effect, c.acts) for c in courses] == [("shupe_mohr", True), ("thermal_hysteresis", False)]

@@ -9,7 +9,6 @@ import numpy as np
 
 from fogml.gap.result import (
     CandidateEvidence,
-    ConstantFit,
     Diagnosis,
     Estimate,
     Found,
@@ -21,7 +20,7 @@ from fogml.gap.result import (
     Verdict,
 )
 from fogml.gap.result_parts import (
-    Counterfactual,
+    ConstantFit,
     Course,
     GapSegment,
     RunSeries,
@@ -194,17 +193,5 @@ def with_courses(found: Diagnosis) -> Diagnosis:
             Course("shupe_mohr", 0.5, "deg/h/(degC/min)", False, True, mohr),
             Course("sensor_lag", 20.0, "s", False, False, slow),
         )
-        told.append(
-            Counterfactual(
-                run=shown.run,
-                held_out=shown.role == "held_out",
-                averaging_s=shown.averaging_s,
-                time_s=shown.time_s,
-                temperature_degc=shown.temperature_degc,
-                recorded=shown.recorded,
-                replayed=shown.replayed_recalibrated,
-                floor=shown.floor,
-                courses=courses,
-            )
-        )
-    return replace(found, counterfactuals=tuple(told))
+        told.append(replace(shown, courses=courses))
+    return replace(found, series=tuple(told))

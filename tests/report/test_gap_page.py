@@ -12,9 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fogml.gap.reports import headline
 from fogml.gap.result import HowFar
 from fogml.gap.result_parts import Where, beyond_noise
+from fogml.gap.sentences import headline
+from fogml.gap.settings import STANDARD
 from fogml.numerals import MISSING, probability_words, unit_words, with_error
 from fogml.report.gap_page import MOST_RUNS_DRAWN, gap_page
 from fogml.report.gap_tables import causes_table, constants_table
@@ -254,7 +255,10 @@ def test_no_gap_is_said_for_certain_where_nothing_is_likelier_than_something(
     assert ("No gap for certain; suspected: Thermal hysteresis of the bias" in first) == (not sure)
     assert ("not for certain" in first) == (not sure)
     scene = SimpleNamespace(candidates=effects(), runs=[], in_time=[])
-    said = headline(SimpleNamespace(scene=scene), found.unknown, "no_gap", found.found, (), (), (), False)
+    bare = replace(found, how_far=(), nearest=(), where=Where())
+    points = SimpleNamespace(static=None, steps=((0.0, 0.0),), best=0)
+    behind = SimpleNamespace(scene=scene, points=points, setting=SimpleNamespace(priors=STANDARD))
+    said = headline(behind, bare, False)
     assert said[0].startswith("Nothing is missing" if sure else "Nothing is sure enough to be named")
 
 

@@ -24,7 +24,6 @@ from fogml.gap.planning.rehearsal import ExpectedRuns, Stage
 from fogml.gap.rows import at_amplitude
 from fogml.intervals import Z90
 from fogml.twin.effect import Effect, NoiseEffect
-from fogml.twin.quantities import Grade, Quantity
 from fogml.twin.registry import effect
 
 Criterion = Literal["D", "A"]
@@ -112,7 +111,7 @@ def unknowns(on: Stage, names: Sequence[str]) -> Unknowns:
         unit = candidate.amplitude.unit
         parameters.append(Parameter(f"{id}.amplitude", unit, value.amplitude, size, None))
         for quantity in candidate.shape:
-            sd = _shape_sd(quantity, *quantity.range(grade))
+            sd = _shape_sd(*quantity.range(grade))
             name = f"{id}.{quantity.name}"
             parameters.append(Parameter(name, quantity.unit, value.shape[quantity.name], sd, sd))
     known = {p.name: i for i, p in enumerate(parameters)}
@@ -215,14 +214,16 @@ def expected(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
     place = {p.name: i for i, p in enumerate(of.parameters)}
     rows = [place[".".join(key)] for key in held]
     prior = np.diag(of.prior_information())
-    spreads = {key: _spread(effect(key[0]), key[1], rehearsal.stage.model.grade) for key in held}
+    grade = rehearsal.stage.model.grade
+    quantities = {(one.id, q.name): q for one in of.effects for q in effect(one.id).shape}
     squares = np.zeros(len(prior))
     for deviates in ndtri(_even_shares(_SHAPES, len(held))):
         true, pull = dict(held), np.zeros_like(planned)
         for (key, value), i, z in zip(held.items(), rows, deviates, strict=True):
-            factor, sd, (low, high) = spreads[key]
-            true[key] = float(np.clip(value * math.exp(factor * z) + sd * z, low, high))
-            if factor:
+            _, spread, log = quantities[key].law(grade)
+            moved = value * math.exp(spread * z) if log else value + spread * z
+            true[key] = float(np.clip(moved, *quantities[key].limits))
+            if log:
                 # Of a normal one the mean square off the plan is the prior's, and nothing is left.
                 off = (true[key] - value) / of.parameters[i].scale
                 pull[i, i] = (prior[i] * off) ** 2 - prior[i]
@@ -233,15 +234,6 @@ def expected(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
     own = np.diag(planned)[rows]
     grown[rows] = np.sqrt(np.maximum(np.minimum(squares[rows], 1.0 / prior[rows]) / own, 1.0))
     return np.asarray(planned * np.outer(grown, grown))
-
-
-def _spread(declared: Effect, name: str, grade: Grade) -> tuple[float, float, tuple[float, float]]:
-    """Of a shape by its prior: deviation of the logarithm or of itself, the other 0; and its limits."""
-    (quantity,) = (one for one in declared.shape if one.name == name)
-    low, high = quantity.range(grade)
-    if low > 0.0:
-        return 0.5 * math.log(high / low) / Z90, 0.0, quantity.limits
-    return 0.0, _shape_sd(quantity, low, high), quantity.limits
 
 
 def _even_shares(count: int, wide: int) -> FloatArray:
@@ -268,6 +260,6 @@ def merit(info: FloatArray, wanted: Sequence[int], criterion: Criterion) -> floa
     return -0.5 * float(np.linalg.slogdet(block)[1]) / len(block)
 
 
-def _shape_sd(quantity: Quantity, low: float, high: float) -> float:
+def _shape_sd(low: float, high: float) -> float:
     """Standard deviation of a shape parameter's prior, as the fit of a diagnosis has it."""
     return max(0.5 * (high - low) / Z90, 1e-12)

@@ -1,9 +1,12 @@
-"""A repeat run for what is not known: whether it goes with temperature, with power-on, or comes anew."""
+"""The run to record next: one that tells a class apart, what something unknown goes with, or shows more.
+
+For what is not known it is a repeat: whether it goes with temperature, with power-on, or comes anew.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -14,19 +17,23 @@ from fogml.gap.cards import card_of
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.model import EffectValue, TwinModel
-from fogml.gap.planning.separating import LEAST_DISTANCE, separating_run
-from fogml.gap.planning.showing import MOST_PROGRAMMES, showing_run
-from fogml.gap.posterior import Judgement, at_cost
-from fogml.gap.result import NAMED, Found, SeparatingRun
-from fogml.gap.result_parts import Rehearsed
-from fogml.gap.rows import Rows
-from fogml.gap.search import Search
-from fogml.gap.shapes import usual_shapes
+from fogml.gap.planning.fisher import stated_or_usual
+from fogml.gap.planning.programme_family import Design, Family
+from fogml.gap.planning.programme_search import finely, search
+from fogml.gap.planning.rehearsal import COARSE_S, FINE_S, Rehearsal, stage
+from fogml.gap.planning.separating import LEAST_DISTANCE, run_of, separating_run
+from fogml.gap.posterior import Judgement
+from fogml.gap.result import Found, SeparatingRun
+from fogml.gap.rows import Rows, at_amplitude
 from fogml.numerals import ascii_number
+from fogml.runs.facts import Facts
 from fogml.settings_check import check_numbers
 from fogml.signals.bases import corners
-from fogml.twin.effect import NoiseEffect
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.programme import Programme, programme_from
+from fogml.twin.registry import effect
+from fogml.twin.twin import Twin
 
 
 @dataclass(frozen=True)
@@ -58,8 +65,12 @@ class RepeatSettings:
 
 
 REPEAT = RepeatSettings()
-FORMS = ("usual", "low", "high")
-"""Shapes in the middle of their ranges, all at the low ends, all at the high ones."""
+MOST_PROGRAMMES = 80
+"""Of 240, three draws of 18 effects gained 1 to 3 % of the lengths over 80, in twice the time and more."""
+HARDLY = 0.3
+"""Length from which getting longer counts in a search."""
+PLENTY = 2.0 * LEAST_DISTANCE
+"""Length from which getting longer does not count any more."""
 
 
 def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
@@ -200,67 +211,65 @@ def _members(found: Inference, judged: Judgement, item: Found) -> list[EffectVal
     return [v for v in values if v.amplitude != 0.0]
 
 
-def rehearse(
-    search: Search, items: Sequence[Found] = (), cost_of_false_name: float = 1.0
-) -> tuple[Rehearsed, ...]:
-    """What a diagnosis of the runs of a search would name, miss or mistake if one candidate acted alone.
+def showing_run(
+    twin: Twin,
+    noise: NoiseModel,
+    constants: Mapping[str, float],
+    ids: Sequence[str],
+    *,
+    hours: float = 24.0,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+    facts: Facts | None = None,
+    most: int = MOST_PROGRAMMES,
+) -> SeparatingRun | None:
+    """The programme that shows as many effects as it can at their usual size.
 
-    Each is put into replays of these very runs, at its usual size and, if it was found, at that, in several
-    forms. The data are what it is expected to make, without noise (G. Cowan et al., Eur. Phys. J. C 71 (2011)
-    1554), judged beside the constants by the evidence of one cause, or of two where something unknown holds
-    them better than any one that is known.
+    Parameters
+    ----------
+    twin, noise, constants, hours, seed, progress, facts, most
+        As in `fogml.gap.planning.separating.separating_run`.
+    ids
+        The effects. Those that a record itself tells, such as the steps of its sensors, no programme shows
+        any better: they are left out.
+
+    Returns
+    -------
+    SeparatingRun or None
+        ``separates`` are the effects that reach a whitened length of `LEAST_DISTANCE` beside the constants,
+        ``distance`` is the least of theirs. None where no effect does.
     """
-    setting = search.field.setting
-    grade = setting.scene.grade
-    sizes = {f.effect: abs(f.amplitude.value) for f in items if f.named}
-    rows = []
-    for f in search.families_of("known"):
-        declared = setting.scene.candidates[search.families[f].id]
-        if isinstance(declared, NoiseEffect) and not declared.steady:
-            continue
-        usual = declared.amplitude.typical(grade)
-        asked = [("usual", usual)] + ([("found", sizes[declared.id])] if declared.id in sizes else [])
-        for form, shape in zip(FORMS, usual_shapes(declared, grade)):
-            for size, amplitude in asked:
-                made = search.field.made(declared, amplitude, shape)
-                rows.append(_judged(search, f, form, size, made, cost_of_false_name))
-            if not declared.shape:
-                break
-    return tuple(rows)
+    on = stage(twin, noise, constants, facts=facts)
+    family = Family(hours, (-40.0, 60.0), ("up", "north") if facts is None else (None,), True)
+    usual = [stated_or_usual(on, effect(id)) for id in ids if _may_show(effect(id))]
+    if not usual:
+        return None
+
+    def merit(design: Design, sample_s: float = COARSE_S) -> float:
+        held = lengths(Rehearsal(on, family, design, sample_s), usual)
+        return float(np.mean(np.log(np.clip(held, HARDLY, PLENTY))))
+
+    tried = search(family, merit, seed=seed, most=most, progress=progress)
+    finals = finely(tried, lambda design: merit(design, FINE_S))
+    reached = lengths(Rehearsal(on, family, finals[0].design, FINE_S), usual)
+    shown = [(value.id, length) for value, length in zip(usual, reached) if length >= LEAST_DISTANCE]
+    if not shown:
+        return None
+    least = float(min(length for _, length in shown))
+    run = run_of(family, finals[:1], [id for id, _ in shown], least, "showing-run")
+    return replace(run, aim="show")
 
 
-def _judged(search: Search, family: int, form: str, size: str, data: FloatArray, cost: float) -> Rehearsed:
-    families, length = search.families, search.field.base.length(data)
-    scores = {frozenset[int](): 0.0} | {frozenset((f,)): s for f, s in search.alone_on(data).items()}
-    alike, probability = _most_likely(search, scores, cost)
-    if probability < NAMED and length >= search.priors.least_detectable:
-        # What something unknown holds better alone may be named beside it.
-        scores = {frozenset(e.key): e.score for e in search.on(data, most_causes=2).explanations()}
-        alike, probability = _most_likely(search, scores, cost)
-    named = probability >= NAMED
-    outcome = "missed" if not named else "named" if family in alike else "mistaken"
-    members = tuple(families[f].id for f in alike) if named else ()
-    return Rehearsed(families[family].id, form, size, length, outcome, members, probability)
+def _may_show(declared: Effect) -> bool:
+    """Whether a programme may show it: not the steps of a record, nor a random error."""
+    if isinstance(declared, NoiseEffect):
+        return declared.steady
+    return not declared.digitises
 
 
-def _most_likely(
-    search: Search, scores: Mapping[frozenset[int], float], cost: float
-) -> tuple[list[int], float]:
-    """The class of known causes that is likeliest by the scores of sets, and its probability."""
-    priors, known = search.priors, set(search.families_of("known"))
-    best = {f: max(s for held, s in scores.items() if f in held) for f in known & frozenset().union(*scores)}
-    if not best:
-        return [], 0.0
-    first = max(best.values())
-    alike = sorted((f for f in best if best[f] > first - priors.exchange), key=lambda f: -best[f])
-
-    def total(kept: Callable[[frozenset[int]], bool]) -> float:
-        return float(
-            np.logaddexp.reduce(np.array([-np.inf, *(s for held, s in scores.items() if kept(held))]))
-        )
-
-    own = total(lambda held: bool(held & set(alike)))
-    others = total(lambda held: bool(held & known) and not held & set(alike))
-    unknown = total(lambda held: not held & known)
-    probability = priors.believed(float(np.logaddexp(own, others)) - unknown, own - others)
-    return alike, at_cost(probability, cost)
+def lengths(rehearsal: Rehearsal, values: Sequence[EffectValue]) -> FloatArray:
+    """Whitened length of each effect beside the constants, shape (k,)."""
+    shapes = [at_amplitude(effect(v.id), v.amplitude, v.shape) for v in values]
+    made = [v.amplitude * rehearsal.white(v.id, [shape]) for v, shape in zip(values, shapes)]
+    columns = np.concatenate(made, axis=1)
+    return np.asarray(np.sqrt(np.maximum(np.diagonal(rehearsal.beside(columns)), 0.0)))

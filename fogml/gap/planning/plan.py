@@ -23,10 +23,8 @@ from fogml.gap.planning.fisher import (
     unknowns,
     usual_value,
 )
-from fogml.gap.planning.next_run import rehearse
 from fogml.gap.planning.plan_result import ExpectedError, Outlook, Plan, PlannedRun, Separation
-from fogml.gap.planning.programme_design import Design, Mounting
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_family import Design, Family, Mounting
 from fogml.gap.planning.programme_search import MOST_RUNS, Tried, finely, search
 from fogml.gap.planning.rehearsal import (
     COARSE_S,
@@ -36,9 +34,10 @@ from fogml.gap.planning.rehearsal import (
     Stage,
     Together,
     mounted,
+    rehearse,
     stage,
 )
-from fogml.gap.planning.separating import Member, distances, least_distance, log_distance, members_of
+from fogml.gap.planning.separating import Member, distances, log_distance, members_of
 from fogml.gap.result_parts import Rehearsed
 from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
@@ -69,25 +68,24 @@ class _Goal:
         if self.of is not None:
             total += merit(information(rehearsed, self.of), self.of.wanted, self.criterion)
         for group in self.groups:
-            total += log_distance(least_distance(rehearsed, group)) / len(self.groups)
+            total += log_distance(rehearsed, group) / len(self.groups)
         return total
 
     def outlook(self, rehearsed: ExpectedRuns) -> Outlook:
         """What runs are expected to tell."""
-        separations = []
-        for group in self.groups:
-            pairs = distances(rehearsed, group, refined=True)
-            apart = pairs[0, 0] if len(group) == 1 else pairs[~np.eye(len(group), dtype=bool)].min()
-            separations.append(Separation(tuple(m.value.id for m in group), float(apart), pairs))
+        separations = tuple(
+            Separation(tuple(m.value.id for m in group), distances(rehearsed, group, refined=True))
+            for group in self.groups
+        )
         if self.of is None:
-            return Outlook((), np.zeros((0, 0)), tuple(separations))
+            return Outlook((), np.zeros((0, 0)), separations)
         block = expected(rehearsed, self.of)[np.ix_(self.of.wanted, self.of.wanted)]
         deviations = np.sqrt(np.diag(block))
         errors = tuple(
             ExpectedError(p.name, p.unit, p.value, p.prior, float(d) * p.scale if d < UNSEEN else None)
             for p, d in zip((self.of.parameters[i] for i in self.of.wanted), deviations)
         )
-        return Outlook(errors, block / np.outer(deviations, deviations), tuple(separations))
+        return Outlook(errors, block / np.outer(deviations, deviations), separations)
 
 
 def plan_runs(

@@ -11,7 +11,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.gap.planning.fisher import Criterion
 from fogml.gap.planning.rehearsal import COARSE_S, FINE_S, Rehearsal
-from fogml.gap.planning.separating import LEAST_DISTANCE
+from fogml.gap.planning.separating import LEAST_DISTANCE, least_of
 from fogml.gap.result_parts import Rehearsed
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
@@ -56,11 +56,15 @@ class ExpectedError:
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """How far apart a plan pulls effects: least distance, and of each (row) from each other (column)."""
+    """How far apart a plan pulls effects: each (row) from each other (column), lengths on the diagonal."""
 
     members: tuple[str, ...]
-    distance: float
     pairs: FloatArray
+
+    @property
+    def distance(self) -> float:
+        """The least distance over pairs, or the length of a single one."""
+        return least_of(self.pairs)
 
     @property
     def enough(self) -> bool:

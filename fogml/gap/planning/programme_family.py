@@ -8,28 +8,152 @@ soaks, a minor loop, turns of the table, power steps. `Family.programme` writes 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.planning.programme_design import (
-    LADDERS,
-    MINOR_SHARE,
-    RAMP_RATES,
-    ROOM_DEGC,
-    SOAKS_S,
-    Design,
-    Mounting,
-    leg,
-    soak,
-)
 from fogml.numerals import short
 from fogml.twin.programme import Programme
-from fogml.twin.steps import Ramp, Step, duration_text
+from fogml.twin.steps import Action, Ramp, Setting, Soak, Step, Switched, Turn, duration_text
+
+ROOM_DEGC = 25.0
+LADDERS: Mapping[str, tuple[float, ...]] = {
+    "none": (),
+    "one rate": (10.0, -10.0),
+    "rates": (0.01, -0.01, 1.0, -1.0, 10.0, -10.0, 100.0, -100.0),
+    "slow rates": (-0.001, 0.001, -0.002, 0.002, -0.0025, 0.0025, -0.003, 0.003, -0.005, 0.005),
+}
+"""Table rates [deg/s] of a ladder; the slow ones go through zero beside the Earth's rate."""
+RATE_S = 120.0
+"""Time at each table rate [s]."""
+POWER_OFF_S, WARM_UP_S, TURN_AFTER_ON_S = 1200.0, 2400.0, 300.0
+SWITCHED_S: Mapping[Switched, tuple[float, float]] = {"fan": (1200.0, 1200.0), "compressor": (900.0, 300.0)}
+"""How long each is off, and on again [s]."""
+YAW_S = 900.0
+MINOR_SHARE = 0.2
+"""Half-width of the minor loop as a share of the span between the limits."""
+RAMP_RATES = (0.25, 0.5, 1.0, 2.0)
+SOAKS_S = (1800.0, 2700.0, 3600.0, 5400.0, 7200.0, 10800.0, 14400.0, 21600.0)
+
+Mounting = Literal["up", "down", "north", "south", "east", "west"]
+
+
+@dataclass(frozen=True)
+class Design:
+    """Choices that make a programme.
+
+    Attributes
+    ----------
+    rates
+        Rate of each cycle between the limits [degC/min]; none for a run at room temperature. None stands
+        for a cycle that is left out.
+    cold_share, hot_share
+        How far the cycles go from room temperature to each limit, 0 to 1.
+    first
+        The limit that is visited first.
+    soak_s
+        Time at rest in each soak, before anything is done in it [s].
+    stops
+        Soaks on the way from one limit to the other.
+    minor_loop
+        Whether a loop within the large one follows.
+    ladder
+        Table rates in each soak, a key of `LADDERS`.
+    power_steps
+        Where the power goes off for a while: nowhere, in the first soak, or in each.
+    cold_start
+        Whether the unit is switched on with the run rather than long before.
+    fan_off, compressor_off, yaw
+        Whether in each soak the fan or the compressor is off for a while, and the fixture yawed.
+    mounting
+        Where the input axis points.
+    """
+
+    rates: tuple[float | None, float | None, float | None] = (1.0, None, None)
+    cold_share: float = 1.0
+    hot_share: float = 1.0
+    first: Literal["cold", "hot"] = "cold"
+    soak_s: float = 3600.0
+    stops: int = 0
+    minor_loop: bool = False
+    ladder: str = "none"
+    power_steps: Literal["none", "first", "each"] = "none"
+    cold_start: bool = False
+    fan_off: bool = False
+    compressor_off: bool = False
+    yaw: bool = False
+    mounting: Mounting | None = "up"
+
+    @property
+    def cycles(self) -> tuple[float, ...]:
+        """Rates of the cycles that are run [degC/min]."""
+        return tuple(rate for rate in self.rates if rate is not None)
+
+    def plain(self) -> Design:
+        """The same programme with choices that make no difference at their defaults."""
+        cycles = self.cycles
+        plain = replace(self, rates=(*cycles, *([None] * (3 - len(cycles)))))  # type: ignore[arg-type]
+        if cycles:
+            return plain
+        plain = replace(plain, first="cold", stops=0)
+        return plain if self.minor_loop else replace(plain, cold_share=1.0, hot_share=1.0)
+
+    @property
+    def items(self) -> int:
+        """How many things are done beside ramps and soaks."""
+        chosen = (self.ladder != "none", self.power_steps != "none", self.stops > 0)
+        return sum((*chosen, self.minor_loop, self.cold_start, self.fan_off, self.compressor_off, self.yaw))
+
+
+def leg(start: float, end: float, rate: float, design: Design) -> list[Step]:
+    """Ramps from one temperature to another with soaks on the way and at the end."""
+    steps: list[Step] = []
+    at = start
+    for number in range(1, design.stops + 2):
+        goal = float(round(start + (end - start) * number / (design.stops + 1)))
+        if goal != at:
+            steps += [Ramp(goal, rate), soak(goal, design)]
+            at = goal
+    return steps
+
+
+def soak(temperature: float, design: Design, opening: bool = False) -> Soak:
+    """A soak: rest first, then one thing after another."""
+    actions: list[Action] = []
+    ladder = LADDERS[design.ladder]
+    turn_s = RATE_S * len(ladder)
+    at = design.soak_s
+
+    def turn(start_s: float) -> None:
+        if ladder:
+            actions.append(Turn(tuple((rate, RATE_S) for rate in ladder), start_s))
+
+    if opening and design.cold_start:
+        actions.append(Setting("power", 1.0))
+        at = max(at, WARM_UP_S + turn_s)
+        turn(TURN_AFTER_ON_S)
+    if ladder:
+        turn(at)
+        at += turn_s
+    if design.yaw:
+        angles = (180.0,) if design.mounting in ("up", "down", None) else (90.0, 180.0, 270.0)
+        for angle in (*angles, 0.0):
+            actions.append(Setting("yaw", angle, at))
+            at += YAW_S
+    if design.power_steps == "each" or (opening and design.power_steps == "first"):
+        actions.append(Setting("power", 0.0, at, POWER_OFF_S))
+        at += POWER_OFF_S
+        turn(at + TURN_AFTER_ON_S)
+        at += WARM_UP_S + turn_s
+    for name, (off_s, on_s) in SWITCHED_S.items():
+        if getattr(design, f"{name}_off"):
+            actions.append(Setting(name, 0.0, at, off_s))
+            at += off_s + on_s
+    return Soak(temperature, at, tuple(actions))
 
 
 @dataclass(frozen=True)
@@ -95,34 +219,33 @@ class Family:
             cold_start=self.power_steps,
             mounting=mounting,
         )
-        found = dict.fromkeys(
-            d for d in map(self.shortened, (self.shortest(), everything, slow, switched)) if d is not None
-        )
-        return tuple(found)
+        within = map(self.shortened, (self.shortest(), everything, slow, switched))
+        return tuple(dict.fromkeys(design for design in within if design is not None))
 
     def neighbours(self, design: Design, rng: np.random.Generator | None = None) -> Iterator[Design]:
         """Designs that differ in one choice; shortened elsewhere where that takes too long.
 
         In random order where `rng` is given. Each is worked out when its turn comes.
         """
-        changes: list[dict[str, Any]] = []
-        for place in range(3):
-            for rate in (None, *RAMP_RATES):
-                rates = list(design.rates)
-                rates[place] = rate
-                changes.append({"rates": tuple(rates)})
-        changes += [{"cold_share": share} for share in (0.25, 0.5, 1.0)]
-        changes += [{"hot_share": share} for share in (0.25, 0.5, 1.0)]
-        changes += [{"first": first} for first in ("cold", "hot")]
-        changes += [{"soak_s": soak} for soak in SOAKS_S]
-        changes += [{"stops": stops} for stops in (0, 1, 3)]
-        changes += [{"ladder": ladder} for ladder in LADDERS]
+        changes: list[dict[str, Any]] = [
+            {"rates": (*design.rates[:place], rate, *design.rates[place + 1 :])}
+            for place in range(3)
+            for rate in (None, *RAMP_RATES)
+        ]
+        choices: dict[str, Iterable[Any]] = {
+            "cold_share": (0.25, 0.5, 1.0),
+            "hot_share": (0.25, 0.5, 1.0),
+            "first": ("cold", "hot"),
+            "soak_s": SOAKS_S,
+            "stops": (0, 1, 3),
+            "ladder": LADDERS,
+        }
         switches = ["minor_loop", "fan_off", "compressor_off", "yaw"]
         if self.power_steps:
-            changes += [{"power_steps": steps} for steps in ("none", "first", "each")]
+            choices["power_steps"] = ("none", "first", "each")
             switches.append("cold_start")
-        changes += [{name: value} for name in switches for value in (False, True)]
-        changes += [{"mounting": mounting} for mounting in self.mountings]
+        choices |= dict.fromkeys(switches, (False, True)) | {"mounting": self.mountings}
+        changes += [{name: value} for name, values in choices.items() for value in values]
         told: set[Design | None] = {None, design}
         for place in range(len(changes)) if rng is None else rng.permutation(len(changes)):
             near = self.shortened(replace(design, **changes[place]))
@@ -132,7 +255,7 @@ class Family:
 
     def shortened(self, design: Design) -> Design | None:
         """The design with shorter soaks, then without its later cycles, until it fits; None if it can't."""
-        # Designs that come to the same are written out once.
+        # Designs that come to the same are written out once, as plain ones.
         while self.programme(design := design.plain()).total_hours > self.hours:
             shorter = [soak for soak in SOAKS_S if soak < design.soak_s]
             if shorter:
@@ -140,8 +263,7 @@ class Family:
             elif design.stops:
                 design = replace(design, stops=0)
             elif len(design.cycles) > 1:
-                *kept, _ = design.cycles
-                design = replace(design, rates=(*kept, *([None] * (3 - len(kept)))))  # type: ignore[arg-type]
+                design = replace(design, rates=design.cycles[:-1])  # type: ignore[arg-type]
             else:
                 return None
         return design
@@ -169,30 +291,19 @@ class Family:
         else:
             words.append("at room temperature" + (" but for a minor loop" if design.minor_loop else ""))
         words.append(f"soaks of {duration_text(design.soak_s)}")
-        if design.stops and design.cycles:
-            words.append(f"{design.stops} more on each leg")
-        if design.minor_loop and design.cycles:
-            words.append("a minor loop")
-        if design.ladder != "none":
-            words.append(f"turns at {design.ladder} in each soak")
-        if design.power_steps != "none":
-            words.append(
-                f"power off and on in {'the first' if design.power_steps == 'first' else 'each'} soak"
-            )
-        if design.cold_start:
-            words.append("switched on at the beginning")
-        words += [
-            text
-            for on, text in (
-                (design.fan_off, "fan off in each soak"),
-                (design.compressor_off, "compressor off in each soak"),
-                (design.yaw, "fixture yawed in each soak"),
-            )
-            if on
-        ]
-        if design.mounting is not None:
-            words.append(f"input axis {design.mounting}")
-        return "; ".join(words)
+        which = "the first" if design.power_steps == "first" else "each"
+        told = (
+            (design.stops and design.cycles, f"{design.stops} more on each leg"),
+            (design.minor_loop and design.cycles, "a minor loop"),
+            (design.ladder != "none", f"turns at {design.ladder} in each soak"),
+            (design.power_steps != "none", f"power off and on in {which} soak"),
+            (design.cold_start, "switched on at the beginning"),
+            (design.fan_off, "fan off in each soak"),
+            (design.compressor_off, "compressor off in each soak"),
+            (design.yaw, "fixture yawed in each soak"),
+            (design.mounting is not None, f"input axis {design.mounting}"),
+        )
+        return "; ".join([*words, *(text for on, text in told if on)])
 
 
 @lru_cache(maxsize=1024)

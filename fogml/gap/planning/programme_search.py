@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.gap.planning.programme_design import Design
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_family import Design, Family
 from fogml.settings_check import check_whole
 
 HOUR_PRICE = 0.01
@@ -28,17 +27,7 @@ _SHORTER = ((0.75, 1.0), (0.5, 0.75), (0.0, 0.5))
 
 @dataclass(frozen=True)
 class Tried:
-    """A design with its merit and its cost.
-
-    Attributes
-    ----------
-    design
-        The design.
-    merit
-        Logarithm of what it gives, the price of its hours not taken off.
-    hours
-        How long it takes [h].
-    """
+    """A design, the logarithm of what it gives, the price of its hours not taken off, and those hours."""
 
     design: Design
     merit: float

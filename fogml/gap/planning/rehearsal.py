@@ -1,9 +1,9 @@
-"""A programme rehearsed: what a run of it would show of each effect, whitened as a diagnosis would."""
+"""Rehearsals: what a run of a programme would show of effects, and what a diagnosis of runs would name."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,14 +13,18 @@ from fogml.arrays import FloatArray
 from fogml.gap.frame import Setting, fixed_columns, whitener_of
 from fogml.gap.linear_gaussian import LinearGaussian
 from fogml.gap.model import TwinModel
-from fogml.gap.planning.programme_design import Design
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_family import Design, Family
+from fogml.gap.posterior import at_cost
 from fogml.gap.reading import rows_of
+from fogml.gap.result import NAMED, Found
+from fogml.gap.result_parts import Rehearsed
 from fogml.gap.rows import Rows, slopes
 from fogml.gap.scene import Scene
+from fogml.gap.search import Search
 from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.effect import NoiseEffect
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.registry import effect
@@ -34,6 +38,8 @@ LEAST_ROWS = 256
 """A short programme is sampled finer, down to about as many rows."""
 USUAL_POWER_W = {"tactical": 3.0, "navigation": 8.0}
 """Heat of the electronics where the twin states none."""
+FORMS = ("usual", "low", "high")
+"""Shapes in the middle of their ranges, all at the low ends, all at the high ones."""
 
 
 @dataclass(frozen=True)
@@ -82,18 +88,16 @@ def stage(
     that states no heat of its electronics gets the usual one, or power steps would warm nothing.
     """
     assumed = []
-    heating = twin.plant.heating
-    plant = twin.plant
+    plant, heating = twin.plant, twin.plant.heating
     if heating.steady_w == 0.0 and heating.initial_w == 0.0:
         watts = USUAL_POWER_W[twin.grade]
         plant = replace(plant, heating=SelfHeating(watts, watts, heating.time_constant_s, heating.node))
         assumed.append(
             f"the electronics turn {watts:g} W into heat while on; twin {twin.name} states no heat of its own"
         )
-    ready = replace(twin, plant=plant)
     return Stage(
-        TwinModel(replace(ready, sensors=Sensors(), noise=NoiseConstants())),
-        ready.sensors,
+        TwinModel(replace(twin, plant=plant, sensors=Sensors(), noise=NoiseConstants())),
+        twin.sensors,
         noise,
         dict(values),
         DEFAULT_FACTS if facts is None else facts,
@@ -160,8 +164,8 @@ class Rehearsal(ExpectedRuns):
         self._whitener = whitener_of(on.noise, rows)
         reading = _reading_noise(rows, on.sensors, on.values)
         self._weights = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
-        scene = Scene((rows,), 1, on.model.grade)
-        setting = Setting(scene, model.constants, STANDARD, (), on.values)
+        scene = Scene((rows,), 1, on.model.grade, constants=on.values)
+        setting = Setting(scene, model.constants, STANDARD, ())
         # How late the unit's sensors are is as little known to a fit of the run as it is to a diagnosis.
         fixed = fixed_columns(setting, 0, replace(model.twin, sensors=on.sensors))
         white, count = self._whiten(fixed), len(model.constants)
@@ -206,3 +210,70 @@ def _reading_noise(rows: Rows, sensors: Sensors, values: Mapping[str, float]) ->
 def mounted(facts: Facts, design: Design) -> Facts:
     """The facts with the design's mounting, where it states one."""
     return facts.model_copy(update={"input_axis": design.mounting or facts.input_axis})
+
+
+def rehearse(
+    search: Search, items: Sequence[Found] = (), cost_of_false_name: float = 1.0
+) -> tuple[Rehearsed, ...]:
+    """What a diagnosis of the runs of a search would name, miss or mistake if one candidate acted alone.
+
+    Each is put into replays of these very runs, at its usual size and, if it was found, at that, in several
+    forms. The data are what it is expected to make, without noise (G. Cowan et al., Eur. Phys. J. C 71 (2011)
+    1554), judged beside the constants by the evidence of one cause, or of two where something unknown holds
+    them better than any one that is known.
+    """
+    setting = search.field.setting
+    grade = setting.scene.grade
+    sizes = {f.effect: abs(f.amplitude.value) for f in items if f.named}
+    rows = []
+    for f in search.families_of("known"):
+        declared = setting.scene.candidates[search.families[f].id]
+        if isinstance(declared, NoiseEffect) and not declared.steady:
+            continue
+        usual = declared.amplitude.typical(grade)
+        asked = [("usual", usual)] + ([("found", sizes[declared.id])] if declared.id in sizes else [])
+        ends = ({q.name: q.range(grade)[i] for q in declared.shape} for i in (0, 1))
+        for form, shape in zip(FORMS, (declared.default_shape(grade), *ends)):
+            for size, amplitude in asked:
+                made = search.field.made(declared, amplitude, shape)
+                rows.append(_judged(search, f, form, size, made, cost_of_false_name))
+            if not declared.shape:
+                break
+    return tuple(rows)
+
+
+def _judged(search: Search, family: int, form: str, size: str, data: FloatArray, cost: float) -> Rehearsed:
+    families, length = search.families, search.field.base.length(data)
+    scores = {frozenset[int](): 0.0} | {frozenset((f,)): s for f, s in search.alone_on(data).items()}
+    alike, probability = _most_likely(search, scores, cost)
+    if probability < NAMED and length >= search.priors.least_detectable:
+        # What something unknown holds better alone may be named beside it.
+        scores = {frozenset(e.key): e.score for e in search.on(data, most_causes=2).explanations()}
+        alike, probability = _most_likely(search, scores, cost)
+    named = probability >= NAMED
+    outcome = "missed" if not named else "named" if family in alike else "mistaken"
+    members = tuple(families[f].id for f in alike) if named else ()
+    return Rehearsed(families[family].id, form, size, length, outcome, members, probability)
+
+
+def _most_likely(
+    search: Search, scores: Mapping[frozenset[int], float], cost: float
+) -> tuple[list[int], float]:
+    """The class of known causes that is likeliest by the scores of sets, and its probability."""
+    priors, known = search.priors, set(search.families_of("known"))
+    best = {f: max(s for held, s in scores.items() if f in held) for f in known & frozenset().union(*scores)}
+    if not best:
+        return [], 0.0
+    first = max(best.values())
+    alike = sorted((f for f in best if best[f] > first - priors.exchange), key=lambda f: -best[f])
+
+    def total(kept: Callable[[frozenset[int]], bool]) -> float:
+        return float(
+            np.logaddexp.reduce(np.array([-np.inf, *(s for held, s in scores.items() if kept(held))]))
+        )
+
+    own = total(lambda held: bool(held & set(alike)))
+    others = total(lambda held: bool(held & known) and not held & set(alike))
+    unknown = total(lambda held: not held & known)
+    probability = priors.believed(float(np.logaddexp(own, others)) - unknown, own - others)
+    return alike, at_cost(probability, cost)

@@ -22,8 +22,7 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.gap.model import EffectValue
-from fogml.gap.planning.programme_design import Mounting
-from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_family import Family, Mounting
 from fogml.gap.planning.programme_search import MOST_RUNS, Tried, finely, search
 from fogml.gap.planning.rehearsal import FINE_S, ExpectedRuns, Rehearsal, Stage, stage
 from fogml.gap.result import SeparatingRun
@@ -116,16 +115,13 @@ def separating_run(
     told = members_of(on, family, members)
     tried = search(
         family,
-        lambda design: log_distance(least_distance(Rehearsal(on, family, design), told)),
+        lambda design: log_distance(Rehearsal(on, family, design), told),
         seed=seed,
         most=most,
         progress=progress,
     )
     finals = finely(
-        tried,
-        lambda design: log_distance(
-            least_distance(Rehearsal(on, family, design, FINE_S), told, refined=True)
-        ),
+        tried, lambda design: log_distance(Rehearsal(on, family, design, FINE_S), told, refined=True)
     )
     distance = math.exp(finals[0].merit)
     if distance < LEAST_DISTANCE:
@@ -145,7 +141,13 @@ def run_of(
         hours=finals[0].hours,
         steps=tuple(text for step in programme.steps for text in _sentences(step)),
         alternatives=tuple(
-            {**alternative_values(family, one), "distance": math.exp(one.merit)} for one in finals[1:]
+            {
+                "summary": family.in_words(one.design),
+                "hours": one.hours,
+                "programme": family.programme(one.design, name="alternative").as_yaml(),
+                "distance": math.exp(one.merit),
+            }
+            for one in finals[1:]
         ),
     )
 
@@ -224,27 +226,14 @@ def distances(rehearsal: ExpectedRuns, members: Sequence[Member], *, refined: bo
     return found
 
 
-def least_distance(rehearsal: ExpectedRuns, members: Sequence[Member], *, refined: bool = False) -> float:
-    """The least distance over pairs, or the length of a single member."""
-    found = distances(rehearsal, members, refined=refined)
-    if len(members) == 1:
-        return float(found[0, 0])
-    return float(found[~np.eye(len(members), dtype=bool)].min())
+def least_of(apart: FloatArray) -> float:
+    """The least over pairs of what `distances` gives, or the length of a single member."""
+    return float(apart[0, 0] if len(apart) == 1 else apart[~np.eye(len(apart), dtype=bool)].min())
 
 
-def log_distance(distance: float) -> float:
-    """Logarithm of a distance, with a floor for none at all."""
-    return math.log(max(distance, 1e-6))
-
-
-def alternative_values(family: Family, one: Tried) -> dict[str, Any]:
-    """A runner-up as JSON-ready values."""
-    programme = family.programme(one.design, name="alternative")
-    return {
-        "summary": family.in_words(one.design),
-        "hours": one.hours,
-        "programme": programme.as_yaml(),
-    }
+def log_distance(rehearsal: ExpectedRuns, members: Sequence[Member], *, refined: bool = False) -> float:
+    """Logarithm of the least distance, with a floor for none at all."""
+    return math.log(max(least_of(distances(rehearsal, members, refined=refined)), 1e-6))
 
 
 def _thinned(count: int) -> Sequence[int]:
