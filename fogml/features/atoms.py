@@ -309,3 +309,9 @@ def _evaluated(
         elif rates[key] is not column:
             column[:] = rates[key]
     return full, settled
+
+
+def temperatures_among(atoms: Sequence[Atom]) -> list[int]:
+    """Places of the atoms that are a temperature itself: no rate, memory or difference."""
+    plain = [atom.operator == "value" and atom.signal.is_sensor for atom in atoms]
+    return [i for i, atom in enumerate(atoms) if plain[i] and atom.signal.unit == "degC"]

@@ -13,8 +13,9 @@ from itertools import combinations
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.features.atoms import temperatures_among
 from fogml.features.parse import parse_features
-from fogml.models.folds import run_folds, time_folds
+from fogml.models.folds import run_folds, time_folds, told_by_each_other
 from fogml.models.linear import LinearRegressor
 from fogml.models.table import run_rows
 from fogml.models.trial import averaged_rows, bare_table, held_out_prediction
@@ -73,7 +74,8 @@ def score_form(features: str, runs: Run | Sequence[Run]) -> FormScore:
     rows = averaged_rows([run_rows(run, parsed) for run in group])
     atoms = np.concatenate([part.atoms for part in rows])
     table = bare_table(rows)
-    folds = run_folds(table) if len(group) > 1 else time_folds(table, blocks_per_fold=1)
+    told = told_by_each_other(table.run_index, atoms[:, temperatures_among(parsed.atoms)])
+    folds = run_folds(table) if told else time_folds(table, blocks_per_fold=1)
     predicted = np.empty(len(table))
     for fitted, held in folds:
         prediction = held_out_prediction(LinearRegressor(), parsed, atoms, table, fitted, held)

@@ -1,7 +1,7 @@
 r"""Several linear descriptions of one drift, fitted without parts of the training runs, and combined.
 
-Left out in turn are whole runs; of one run its halves, either direction of temperature, and shorter blocks of
-time. `fogml.models.weights` weighs what members predict of them.
+Left out in turn are whole runs where others tell them; else halves, either direction of temperature, and
+shorter blocks of time. `fogml.models.weights` weighs what members predict of them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fogml.features.operators import beyond
 from fogml.features.parse import parse_features
 from fogml.features.terms import Term
 from fogml.models.box import learn_box
-from fogml.models.folds import Fold, time_folds
+from fogml.models.folds import Fold, time_folds, told_by_each_other
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import MixedEffects, linear_regressor
 from fogml.models.regressors import goes_on_linearly, predict_rows, refit
@@ -112,7 +112,10 @@ def standard_errors(columns: FloatArray, covariance: FloatArray, noise: float) -
 
 
 def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[str, Fold]]:
-    """Parts to leave out: whole runs; of one run halves, either direction of temperature, blocks of time."""
+    """Parts to leave out: whole runs; else halves of each, either direction of temperature, blocks of time.
+
+    Whole runs where there are several that tell each other.
+    """
     runs = [np.flatnonzero(table.run_index == run) for run in np.unique(table.run_index)]
     rising = np.zeros(len(table), dtype=np.bool_)
     for rows in runs:
@@ -122,7 +125,7 @@ def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[
     parts = [
         (kind, (np.setdiff1d(everything, rows), rows))
         for kind, groups in (
-            ("runs", runs if len(runs) > 1 else []),
+            ("runs", runs if told_by_each_other(table.run_index, temperature[:, None]) else []),
             ("halves", [half for rows in runs for half in np.array_split(rows, 2)]),
             ("directions", [np.flatnonzero(rising), np.flatnonzero(~rising)]),
         )

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.features.atoms import AtomValues
+from fogml.features.atoms import AtomValues, temperatures_among
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.signal import check_holds
@@ -143,8 +143,8 @@ class FeatureModel(DriftModel):
 
     def _interval(self, rows: Sequence[RunRows]) -> Intervals:
         """Half-widths of the prediction interval, from parts of the training rows left out."""
-        table = interval_table(rows)
-        found = out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
+        table, own = interval_table(rows), self.features_
+        found = out_of_fold_intervals(table, self._out_of_fold, own.window_s, temperatures_among(own.atoms))
         is_linear = isinstance(self.regressor_, LinearRegressor)
         return found if is_linear else widened_to_use(found, rows, self._drift_at)
 

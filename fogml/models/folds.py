@@ -12,14 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fogml.arrays import BoolArray, IndexArray
+from fogml.arrays import BoolArray, FloatArray, IndexArray
 from fogml.errors import InputError, counted
+from fogml.models.box import LEAST_SPAN_DEGC
 
 if TYPE_CHECKING:
     from fogml.models.table import TrainingTable
 
 Fold = tuple[IndexArray, IndexArray]
 """Indices of the rows fitted to, and of the rows held out."""
+LEAST_SHARE = 0.25
+"""Share of a run's temperatures that others have to hold to tell it, as a unit has to of its fleet's."""
 FOLDS = 5
 BLOCKS_PER_FOLD = 4
 
@@ -92,6 +95,32 @@ def run_folds(table: TrainingTable) -> list[Fold]:
         (np.flatnonzero(table.run_index != number), np.flatnonzero(table.run_index == number))
         for number in numbers
     ]
+
+
+def told_by_each_other(run_index: IndexArray, temperatures: FloatArray) -> bool:
+    """Whether there are several runs, and the others hold a quarter or more of what each runs through.
+
+    Of a cycle beside a run at one temperature, or of a cold run beside a hot one, the other says nothing:
+    what a fit to it leaves there is how it goes on, not how runs differ. A run that stays at its temperature
+    runs through nothing, and is told wherever it lies.
+
+    Parameters
+    ----------
+    run_index
+        Run of each row, shape (n,).
+    temperatures
+        Temperatures [degC], shape (n, k).
+    """
+    numbers = np.unique(run_index)
+    for number in numbers:
+        rest, own = temperatures[run_index != number], temperatures[run_index == number]
+        if not len(rest):
+            return False
+        span = np.ptp(own, axis=0)
+        shared = np.minimum(rest.max(axis=0), own.max(axis=0)) - np.maximum(rest.min(axis=0), own.min(axis=0))
+        if np.any((span >= LEAST_SPAN_DEGC) & (shared < LEAST_SHARE * span)):
+            return False
+    return len(numbers) > 1
 
 
 def _near(table: TrainingTable, held: BoolArray, guard_s: float) -> BoolArray:

@@ -1,9 +1,9 @@
 """Prediction intervals from what a model leaves on parts of the training runs it did not see.
 
 Training rows are averaged over ``averaging_s``, cut into folds of time (whole runs where there
-are three or more: `half_widths_of_runs`), and for each fold the model is fitted to the others. Of
-folds of time the half-width at a level p is the conformal quantile of the n absolute residuals: the
-ceil((n + 1) p)-th smallest (Vovk, Gammerman & Shafer 2005; the cross-conformal form is
+are several that tell each other: `half_widths_of_runs`), and for each fold the model is fitted to the
+others. Of folds of time the half-width at a level p is the conformal quantile of the n absolute
+residuals: the ceil((n + 1) p)-th smallest (Vovk, Gammerman & Shafer 2005; the cross-conformal form is
 Barber et al., "Predictive inference with the jackknife+", Ann. Statist. 49, 2021), widened by the slow
 noise that parts left out share with the rows about them (`fogml.models.unseen_noise`).
 
@@ -27,7 +27,7 @@ from pydantic import Field, with_config
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.models.folds import Fold, run_folds, time_folds
+from fogml.models.folds import Fold, run_folds, time_folds, told_by_each_other
 from fogml.models.table import (
     Compose,
     RunRows,
@@ -155,7 +155,6 @@ def quantiles_of_parts(lefts: Sequence[FloatArray], levels: FloatArray) -> Float
 
 
 _LEAST_AVERAGES = 60
-_RUNS_TO_LEAVE_OUT = 3
 WHOLE_RUNS = "whole runs"
 
 
@@ -170,9 +169,11 @@ def interval_table(rows: Sequence[RunRows], compose: Compose = lambda atoms: ato
     return averaged_table(rows, compose, averaging_of(rows, least_s))
 
 
-def interval_folds(table: TrainingTable, guard_s: float = 0.0) -> tuple[list[Fold], str]:
-    """Whole runs where there are three or more, else blocks of time; and the name of which."""
-    if len(np.unique(table.run_index)) >= _RUNS_TO_LEAVE_OUT:
+def interval_folds(
+    table: TrainingTable, guard_s: float = 0.0, values: Sequence[int] = ()
+) -> tuple[list[Fold], str]:
+    """Whole runs where there are several that tell each other, else blocks of time; and the name of which."""
+    if told_by_each_other(table.run_index, table.X[:, list(values)]):
         return run_folds(table), WHOLE_RUNS
     return time_folds(table, guard_s=guard_s), "time blocks"
 
@@ -234,6 +235,7 @@ def out_of_fold_intervals(
     table: TrainingTable,
     predicted: Callable[[TrainingTable, TrainingTable], FloatArray],
     guard_s: float = 0.0,
+    values: Sequence[int] = (),
 ) -> Intervals:
     """Intervals from residuals on the rows that each fold leaves out.
 
@@ -245,10 +247,12 @@ def out_of_fold_intervals(
         Given the rows to fit to and the rows left out, the prediction [deg/h] for the latter.
     guard_s
         Rows nearer than this to a left-out block of time are not fitted to [s].
+    values
+        Columns that runs must hold of each other to be left out whole.
     """
     if len(table) < 2:
         return intervals_from_residuals(table.y - predicted(table, table), table.averaging_s, "none")
-    folds, name = interval_folds(table, guard_s)
+    folds, name = interval_folds(table, guard_s, values)
     if not folds:
         folds, name = time_folds(table), "time blocks"
     told = np.full(len(table), table.y.mean())

@@ -28,7 +28,7 @@ from pydantic import Field
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.features.atoms import AtomValues
+from fogml.features.atoms import AtomValues, temperatures_among
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel, Evaluation
@@ -151,7 +151,9 @@ class JointModel(DriftModel):
             group, hashes=hashes, rows=row_count(rows), features=self.features_, notes=notes
         )
         table = averages_with_turns(rows, lambda part: np.column_stack((self._columns(part), part)))
-        self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
+        first = self.regressor_.n_features_in_ + 1
+        values = [first + place for place in temperatures_among(self.features_.atoms)]
+        self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, self.features_.window_s, values)
         return self
 
     def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:

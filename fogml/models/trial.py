@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from fogml.arrays import FloatArray, IndexArray
+from fogml.features.atoms import temperatures_among
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
 from fogml.models.box import direction_is_told, each_moves_both_ways, learn_box, moves_both_ways
 from fogml.models.candidates import Candidate, Score, candidates_for, candidates_of, choose, union_of
-from fogml.models.folds import Fold, dealt_blocks, run_folds, time_folds
+from fogml.models.folds import Fold, dealt_blocks, run_folds, time_folds, told_by_each_other
 from fogml.models.linear import LinearRegressor
 from fogml.models.rbf.rates import RATES_THAT_TELL, distinct_rates
 from fogml.models.regressors import (
@@ -57,7 +58,7 @@ class Trial:
     rates
         Number of distinct rates of temperature in the training runs.
     several_runs
-        Whether there are several runs, each of which is left out in turn.
+        Whether there are several runs that tell each other, each of which is left out in turn.
     both_directions
         Whether temperature moves both ways in the training runs (`fogml.models.box`).
     direction_told
@@ -87,7 +88,8 @@ class Trial:
         self._atoms = np.concatenate([part.atoms for part in averaged])
         self._table = bare_table(averaged)
         # A run shorter than the windows leaves no row.
-        self.several_runs = len(np.unique(self._table.run_index)) > 1
+        values = self._atoms[:, temperatures_among(union.atoms)]
+        self.several_runs = told_by_each_other(self._table.run_index, values)
         self._partings: list[list[Fold]] = [time_folds(self._table, FOLDS, blocks_per_fold=BLOCKS_PER_FOLD)]
         if self.several_runs:
             self._partings.insert(0, run_folds(self._table))

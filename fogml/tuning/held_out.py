@@ -18,7 +18,7 @@ from fogml.models.card import checked_runs
 from fogml.models.combination import left_out
 from fogml.models.compact import Compact, network_of, operations_of_compact, operations_of_features
 from fogml.models.feature_model import FeatureModel
-from fogml.models.folds import Fold, run_folds, time_folds
+from fogml.models.folds import Fold, run_folds, time_folds, told_by_each_other
 from fogml.models.names import make_model
 from fogml.models.regressors import parameter_count, weight_bytes
 from fogml.models.table import RunRows, TrainingTable, longest_interval_s, usable_rows, without_refilling
@@ -114,7 +114,7 @@ class HeldOut:
         Choices from outside the space that are judged beside.
     folds
         ``runs`` leaves out a run at a time, ``time`` blocks of time; ``auto`` takes runs where there
-        are several.
+        are several that tell each other.
     count
         Number of folds of time, one of `FOLD_COUNTS`.
     seed
@@ -145,7 +145,11 @@ class HeldOut:
             *(one.made.union.text if one.made else one.features for one in references if one.features),
         ]
         self._used = [_rows_of_all(run, texts) for run in self.runs]
-        by_run = folds == "runs" or (folds == "auto" and len(self.runs) > 1)
+        by_run = folds == "runs" or (
+            folds == "auto"
+            and len(self.runs) > 1
+            and told_by_each_other(self._table.run_index, self._atoms("T"))
+        )
         self.folds: list[Fold] = (
             run_folds(self._table)
             if by_run

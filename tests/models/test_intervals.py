@@ -9,6 +9,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.models.feature_model import FeatureModel
+from fogml.models.folds import told_by_each_other
 from fogml.models.intervals import (
     LEVELS,
     Intervals,
@@ -50,7 +51,7 @@ def test_conformal_intervals_hold_as_often_as_they_say():
 
 @pytest.mark.parametrize("level", [0.5, 0.8, 0.9])
 def test_intervals_hold_on_another_run_of_the_same_kind(level):
-    model = FeatureModel("T^1..2, dT, T_in-T_out").fit([synthetic_run(f"{s}", 1.0, seed=s) for s in (0, 1)])
+    model = FeatureModel("T^1..2, dT, T_in-T_out").fit(synthetic_run("0", 1.0))
     held = []
     for seed in range(2, 8):
         other = synthetic_run("other", 1.0, seed=seed)
@@ -83,8 +84,39 @@ def test_three_runs_are_left_out_whole():
     assert model.intervals_.folds == "whole runs"
     # Leaving out a run that lies 0.3 off the mean of all shows 0.45 off the mean of the others.
     assert model.intervals_.half_width(0.95) > 0.4
-    blocks = FeatureModel("T^1..2, dT, T_in-T_out").fit(shifted[:2])
-    assert blocks.intervals_.folds == "time blocks"
+
+
+def test_the_shift_between_two_runs_is_in_their_interval() -> None:
+    """Normal shifts: a third run lies within 2.92 differences of two as often as Cauchy's law says."""
+    rng, time = np.random.default_rng(5), 100.0 * np.arange(40.0)
+
+    def shifted(name: str) -> Run:
+        gyro = rng.standard_normal() + 1e-3 * rng.standard_normal(len(time))
+        return Run.from_columns(name, time=time, gyro=gyro)
+
+    held = []
+    for _ in range(150):
+        model = make_model("mean").fit([shifted("a"), shifted("b")])
+        held.append(np.abs(shifted("c").gyro - model.bias_) <= model.intervals_.half_width(0.9))
+    expected = 2.0 / np.pi * np.arctan(2.92 * np.sqrt(2.0 / 1.5))
+    assert abs(np.mean(held) - expected) < 0.09
+
+
+@pytest.mark.parametrize(
+    ("spans", "told"),
+    [
+        ([(0.0, 40.0)], False),
+        ([(0.0, 40.0), (0.0, 40.0)], True),
+        ([(0.0, 40.0), (20.0, 20.1)], False),  # what is at one temperature tells no cycle
+        ([(0.0, 40.0), (5.0, 35.0), (20.0, 20.1)], True),
+        ([(0.0, 40.0), (40.0, 80.0)], False),
+        ([(20.0, 20.1), (50.0, 50.1)], True),
+    ],
+)
+def test_runs_tell_each_other_where_they_share_temperatures(spans, told) -> None:
+    temperatures = np.concatenate([np.linspace(*span, 50) for span in spans])[:, None]
+    run_index = np.repeat(np.arange(len(spans)), 50)
+    assert told_by_each_other(run_index, temperatures) == told
 
 
 def test_a_richer_model_does_not_get_a_narrower_interval_for_fitting_noise():
