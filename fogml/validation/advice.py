@@ -48,6 +48,9 @@ class Asked:
     beside
         Share of the rms on the worst test run by which a model judged beside has to leave less before it is
         named instead: two fits of one unit differ by as much from run to run.
+    judged
+        Share of the trained temperatures that the test runs go over, below which care is due: of most of what
+        the model is for, no figure tells.
     coverage
         Share of a test run's averages that the model's 90 % interval holds, below which the interval can't
         be relied on. Averages that follow each other are alike, so that a run may hold 0.8 by chance.
@@ -58,6 +61,7 @@ class Asked:
     mostly_still: float = 0.5
     saturated: float = 0.01
     beside: float = 0.05
+    judged: float = 0.5
     coverage: float = 0.8
 
 
@@ -153,6 +157,7 @@ def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
     yield from _not_judged(judgement)
     yield from _one_way(judgement)
     yield from _one_temperature(judgement)
+    yield from _partly_judged(judgement, asked)
     for run in judgement.test:
         yield from reversed_reasons(run)
         still = still_reason(run, asked.mostly_still, "judged")
@@ -248,6 +253,27 @@ def _one_temperature(judgement: Judgement) -> Iterator[Reason]:
             f"Temperature spans {short(_span(held), 2)} degC in training: what is compensated holds at "
             f"{short(float(np.mean(held[0])))} degC alone.",
             "Train on a ramp up and a ramp down over the range of use.",
+        )
+
+
+def _partly_judged(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
+    held, used = _temperatures(judgement.train), _temperatures(judgement.test)
+    if not held or not used or min(_span(held), _span(used)) < LEAST_SPAN_DEGC:
+        return
+    low, high = min(T.min() for T in held), max(T.max() for T in held)
+    # Of runs at several temperatures each counts by what it goes over itself.
+    ends = sorted((max(T.min(), low), min(T.max(), high)) for T in used)
+    over, reached = 0.0, low
+    for begin, end in ends:
+        over += max(end - max(begin, reached), 0.0)
+        reached = max(reached, end)
+    if over < asked.judged * (high - low):
+        yield Reason(
+            "use_with_care",
+            "judged over a part of its temperatures",
+            f"The test runs go over {short(over, 2)} of the {short(high - low, 2)} degC from "
+            f"{short(low, 2)} to {short(high, 2)} degC that it was trained over: the rest was not tested.",
+            "Judge it on a run that goes over the range of use.",
         )
 
 

@@ -127,6 +127,30 @@ def test_each_reason_alone_decides(make: Callable[[], Judgement], grade: str, br
     assert found.next_step
 
 
+@pytest.mark.parametrize(
+    ("parts", "told"),
+    [
+        ([(0.3, 0.79)], "39 of the 80 degC"),
+        ([(0.0, 0.2), (0.5, 0.75)], "36 of the 80 degC"),
+        ([(-0.5, 0.4), (0.2, 0.3)], "32 of the 80 degC"),
+        ([(0.2, 0.71)], ""),
+        ([(0.0, 0.3), (0.2, 0.6)], ""),
+    ],
+)
+def test_what_test_runs_do_not_go_over_is_not_judged(parts: list[tuple[float, float]], told: str) -> None:
+    """Trained from -20 to 60 degC; what counts is what the test runs go over together."""
+    base = judgement()
+    train, (run,) = (of_ways(base.train[0], "up"), of_ways(base.train[0], "down")), base.test
+    tests = []
+    for ends in parts:
+        course = np.linspace(*(-20.0 + 80.0 * np.array(ends)), len(run.series.time))
+        tests.append(replace(run, series=replace(run.series, temperature=course)))
+    found = advice_on(replace(base, train=train, test=tuple(tests)))
+    assert found.grade == ("use_with_care" if told else "use")
+    assert (found.brief == "judged over a part of its temperatures") == bool(told)
+    assert told in found.reasons[0]
+
+
 def test_a_reason_that_asks_ends_with_its_question() -> None:
     asking = replace(SIGN, message="is its sign wrong?")
     (reason, *_) = advice_on(trained_on(asking)).reasons
