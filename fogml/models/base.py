@@ -249,7 +249,7 @@ class DriftModel(BaseEstimator, ABC):
         Raises
         ------
         InputError
-            If the level is not between 0 and 1.
+            If the level is not above 0, or above 0.995, the highest of whose width anything is known.
         """
         evaluation = self.evaluate(run)
         half = self.intervals_.half_width(level, evaluation.excess)

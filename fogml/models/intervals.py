@@ -76,15 +76,17 @@ class Intervals:
     def half_width(self, level: float, excess: ArrayLike = 0.0) -> FloatArray:
         """Half-width [deg/h] at a level, for samples `excess` spans outside the box.
 
-        A level above what the residuals can tell, n / (n + 1), gives the widest one stored.
+        A level that is stored, yet above what `count` residuals can tell, n / (n + 1), has the width of the
+        largest of them.
 
         Raises
         ------
         InputError
-            If the level is not between 0 and 1.
+            If the level is not above 0, or above the highest that is stored.
         """
-        if not 0.0 < level < 1.0:
-            raise InputError(f"interval level {level}: must lie between 0 and 1, e.g. 0.9")
+        most = self.levels[-1]
+        if not 0.0 < level <= most:
+            raise InputError(f"interval level {level:g}: must lie above 0 and not above {most:g}, e.g. 0.9")
         inside = np.interp(level, (0.0, *self.levels), (0.0, *self.half_widths))
         return np.asarray(inside * (1.0 + self.widening_per_span * np.asarray(excess, dtype=np.float64)))
 

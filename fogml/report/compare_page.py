@@ -17,6 +17,7 @@ from fogml.report.tables import Row, Table, columns_of
 from fogml.report.verdict import floor_told, own_noise, seen_told, stated_limits, unseen, worst_run
 from fogml.signals.drawn import drawn, gap_starts
 from fogml.validation.advice import output_reasons
+from fogml.validation.floors import made_worse
 from fogml.validation.results import Judgement, RunJudgement
 
 CHOOSER = "auto"
@@ -84,7 +85,8 @@ def _verdict(judgements: Mapping[str, Judgement], order: list[str]) -> list[str]
         sentences.append(f"Within 2 % of it: {listed(close, 6)}.")
     if "mean" in judgements:
         least = worst_run(judgements["mean"].test).after.rms
-        harm = [n for n in order if n not in BASELINES and worst_run(judgements[n].test).after.rms > least]
+        worst = {n: worst_run(judgements[n].test) for n in order if n not in BASELINES}
+        harm = [n for n, run in worst.items() if made_worse(run, least, run.after.rms)]
         if harm:
             sentences.append(f"Worse than no drift model (mean): {listed(harm, 6)}.")
     return sentences

@@ -23,7 +23,7 @@ from fogml.report.tables import (
 )
 from fogml.report.verdict import (
     advice_words,
-    improves,
+    does_harm,
     model_card,
     stated_limits,
     subject,
@@ -98,7 +98,7 @@ def headline_tiles(judgement: Judgement) -> list[Tile]:
     )
     tiles = [
         Tile("Rms before", number(worst.before.rms), "deg/h", on),
-        Tile("Rms after", number(worst.after.rms), "deg/h", gain, "" if improves(worst) else "missed"),
+        Tile("Rms after", number(worst.after.rms), "deg/h", gain, "missed" if does_harm(worst) else ""),
         Tile("Bias stability after", number(worst.after.bias_stability), "deg/h", over),
         Tile("Noise floor", number(worst.floor), "deg/h", over),
         Tile("Outside training", percent(worst.outside_training), "", "of the samples judged"),

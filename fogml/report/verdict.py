@@ -10,7 +10,7 @@ import numpy as np
 from fogml.numerals import against, averages, label, listed, number, percent, plural, stated, unit_of
 from fogml.report.tables import reference_of
 from fogml.validation.advice import SEEN, Advice, Asked
-from fogml.validation.floors import left_is_noise
+from fogml.validation.floors import left_is_noise, made_worse
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
 UNSETTLED_SHARE = 0.01
@@ -75,9 +75,9 @@ def unseen(judgement: Judgement) -> bool:
     return not any(finding.code == SEEN for run in judgement.test for finding in run.findings)
 
 
-def improves(judged: RunJudgement) -> bool:
-    """Whether the rms is smaller after than before."""
-    return judged.after.rms < judged.before.rms
+def does_harm(judged: RunJudgement) -> bool:
+    """Whether the rms after is larger than before by more than the run's noise hides."""
+    return made_worse(judged, judged.before.rms, judged.after.rms)
 
 
 def floor_told(run: RunJudgement) -> str:
@@ -131,17 +131,17 @@ def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
             left = f"{where} only the training runs' mean is taken off"
         return [f"{left}: {after} deg/h stays (bias stability, {over}); {floor}."]
     rms = f"from {number(worst.before.rms)} to {number(worst.after.rms)} deg/h"
-    if not improves(worst):
+    if does_harm(worst):
         return [
             f"{where} the {kind} model does harm: rms goes {rms}, bias stability from {before} to {after} "
             f"deg/h ({over}); {floor}."
         ]
-    if worst.after.bias_stability > worst.before.bias_stability:
+    if made_worse(worst, worst.before.bias_stability, worst.after.bias_stability):
         did = f"brings the rms {rms} and makes the bias stability worse, {before} to {after} deg/h ({over})"
     else:
         did = f"leaves {after} deg/h of {before} deg/h (bias stability, {over})"
     sentence = f"{where} the {kind} model {did}; {floor}."
-    harmed = [run.run for run in judgement.test if not improves(run)]
+    harmed = [run.run for run in judgement.test if does_harm(run)]
     return [sentence, own_noise(worst), *([f"It makes {listed(harmed)} worse."] if harmed else [])]
 
 

@@ -142,16 +142,39 @@ def floor_interval(floor: float, averages: int, level: float = LEVEL) -> tuple[f
     return float(low), float(high)
 
 
+def most_noise(judged: RunJudgement, averages: int) -> float:
+    """Largest rms of so many averages of a run that is noise alone, as far as it tells [deg/h].
+
+    The upper end of the interval for noise alone, of the upper end of the floor's.
+    """
+    upper = judged.floor if judged.floor_ci90 is None else judged.floor_ci90[1]
+    return floor_interval(upper, averages)[1]
+
+
+def made_worse(judged: RunJudgement, before: float, after: float) -> bool:
+    """Whether a figure of what is left on a run has risen by more than the run's noise hides.
+
+    More is left than noise alone leaves, and what came in addition, by squares as drift and noise add up,
+    is no less than the noise floor: as much as has to be taken away before a model is said to take any.
+
+    Parameters
+    ----------
+    judged
+        The run.
+    before, after
+        Rms or bias stability of the averages without and with the model [deg/h].
+    """
+    return after**2 - before**2 > judged.floor**2 and after > most_noise(judged, len(judged.series.time))
+
+
 def left_is_noise(judged: RunJudgement) -> bool:
     """Whether what is left after a model is the gyro's own noise, as far as the averages can tell.
 
-    Their standard deviation is at most the upper end of its interval for noise alone, of the upper end of the
-    floor's; an output that stands still tells nothing of it.
+    Their standard deviation is at most `most_noise`; an output that stands still tells nothing of it.
     """
     if judged.still is not None:
         return False
-    upper = judged.floor if judged.floor_ci90 is None else judged.floor_ci90[1]
-    return judged.after.bias_stability <= floor_interval(upper, len(judged.series.time) - 1)[1]
+    return judged.after.bias_stability <= most_noise(judged, len(judged.series.time) - 1)
 
 
 def out_of_reach(

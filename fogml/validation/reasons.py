@@ -12,7 +12,7 @@ import numpy as np
 
 from fogml.numerals import percent, short
 from fogml.runs.findings import IMPLAUSIBLE
-from fogml.validation.floors import floor_interval
+from fogml.validation.floors import made_worse, most_noise
 from fogml.validation.results import RunJudgement
 
 Grade = Literal["use", "use_with_care", "do_not_use"]
@@ -186,8 +186,7 @@ def _with_course_of(one: RunJudgement, other: RunJudgement) -> tuple[float, floa
 def gained_reasons(run: RunJudgement) -> Iterator[Reason]:
     """What a run says for or against the model by how much it takes away there."""
     before, after = run.before.rms, run.after.rms
-    upper = run.floor if run.floor_ci90 is None else run.floor_ci90[1]
-    noise = floor_interval(upper, len(run.series.time))[1]
+    noise = most_noise(run, len(run.series.time))
     gained = before - after
     # The mean of one run also holds what its power-on shifted, by chance: that is no merit and no fault.
     steadier = run.before.bias_stability - run.after.bias_stability
@@ -205,7 +204,7 @@ def gained_reasons(run: RunJudgement) -> Iterator[Reason]:
             f"{short(run.before.bias)} without the model: that power-on shifted it, or the model did.",
             "Judge it on more runs: their means tell which, and how repeatable the bias is.",
         )
-    elif gained < 0.0 and after > noise:
+    elif made_worse(run, before, after):
         yield Reason(
             "do_not_use",
             f"worse than none on {run.run}",

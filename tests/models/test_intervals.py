@@ -139,6 +139,9 @@ def test_round_trip_and_bad_values():
     assert saved_intervals(as_written(intervals)) == intervals
     with pytest.raises(InputError, match="level"):
         intervals.half_width(1.0)
+    assert intervals.half_width(0.995) == 9.0
+    with pytest.raises(InputError, match=r"0\.999: must lie above 0 and not above 0\.995"):
+        intervals.half_width(0.999)
     with pytest.raises(InputError, match="too short"):
         intervals_from_residuals([], 50.0, "time blocks")
 

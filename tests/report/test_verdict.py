@@ -9,6 +9,7 @@ import pytest
 
 from fogml.numerals import against, number
 from fogml.report.certificate import certificate
+from fogml.report.compare_page import compare_page
 from fogml.report.train_page import train_page
 from fogml.report.verdict import model_card, own_noise, stated_limits, subject, verdict, worst_run
 from fogml.runs.findings import Finding
@@ -44,16 +45,31 @@ def test_harm_is_called_harm() -> None:
 def test_a_bias_stability_made_worse_is_not_called_what_is_left() -> None:
     judged = judgement()
     run = judged.test[0]
-    poor = replace(run, before=replace(run.before, bias_stability=1e-4))
+    poor = replace(run, after=replace(run.after, bias_stability=2.0 * run.before.bias_stability))
     lead = verdict(replace(judged, test=(poor,)))[0]
     assert "makes the bias stability worse" in lead and "leaves" not in lead
 
 
+@pytest.mark.parametrize(("beyond", "harm"), [(0.3, False), (3.0, True)])
+def test_harm_is_what_the_noise_does_not_hide(beyond: float, harm: bool) -> None:
+    """Drift of `beyond` floors that a model adds to what is there: the squares add up."""
+    judged = judgement()
+    (run,) = judged.test
+    after = float(np.hypot(run.before.rms, beyond * run.floor))
+    poor = replace(run, after=replace(run.before, rms=after))
+    none = replace(judged, test=(replace(run, after=run.before),))
+    judged = replace(judged, test=(poor,))
+    assert after > run.before.rms and ("does harm" in verdict(judged)[0]) is harm
+    page = Page(compare_page({"rbf": judged, "mean": none}))
+    assert ("Worse than no drift model (mean): rbf." in page.text) is harm
+    assert ("worse than none on b.csv" in advice_on(judged).brief) is harm
+
+
 def test_one_run_made_worse_among_several_is_named() -> None:
-    judged = judgement(2)
+    judged = judgement(2, left=0.2)
     poor = replace(judged.test[0], before=replace(judged.test[0].before, rms=1e-4))
     text = " ".join(verdict(replace(judged, test=(poor, judged.test[1]))))
-    assert "b.csv" in text and "worse" in text
+    assert "On c.csv, the worst" in text and "It makes b.csv worse." in text
 
 
 def test_a_bias_that_makes_up_most_of_the_rest_is_told() -> None:

@@ -200,6 +200,8 @@ def test_where_the_mean_of_the_run_moved_the_steadier_model_is_named() -> None:
         (0.6, 0.0, "use_with_care", "takes away less than the noise on b.csv"),
         (9.0, 0.95, "use_with_care", "leaves most of it on b.csv"),
         (9.0, 0.999, "do_not_use", "takes away less than the noise on b.csv"),
+        (9.0, 1.001, "do_not_use", "takes away less than the noise on b.csv"),
+        (9.0, 1.01, "do_not_use", "worse than none on b.csv"),
     ],
 )
 def test_what_is_taken_away_is_told_by_squares(drift: float, left: float, grade: str, brief: str) -> None:
