@@ -29,6 +29,7 @@ from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.make import make_cases
 from fogml.blind.plan import MIX
 from fogml.blind.relatives import leave_out_relatives
+from fogml.blind.run import case_stamp
 from fogml.blind.truth import read_truth
 from fogml.errors import InputError
 from fogml.json_files import write_json
@@ -241,6 +242,7 @@ def write_round(
             told["diagnosis"][name] = {"group": read_truth(suite.truth / f"{name}.json").reality}
         for track, folder in folders.items():
             for name, values in told[track].items():
+                values["files_sha256"] = case_stamp(folder.cases / name)
                 values["answer_sha256"] = commitment(salt, folder.kept(name))
         values = {
             "schema": SCHEMA,

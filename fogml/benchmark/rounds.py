@@ -2,7 +2,7 @@
 
 ::
 
-    DIR/handout/round.json           cases, rules, a salted hash of each answer
+    DIR/handout/round.json           cases, rules, a hash of each case's files, a salted one of its answer
     DIR/handout/drift/NNNN/          fit-1.csv … held-out-1.csv, its gyro column 0 in every row
     DIR/handout/diagnosis/NNNN/      as `fogml blind make` makes it
     DIR/kept/                        key.json (seed and salt), drift/NNNN/held-out-1.csv, diagnosis/NNNN.*
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from fogml.blind.folders import BlindFolder, read_json
+from fogml.blind.run import case_stamp
 from fogml.blind.truth import Kind
 from fogml.errors import InputError
 from fogml.json_files import json_object
@@ -151,8 +152,15 @@ def read_round(directory: str | Path) -> dict[str, Any]:
     return json_object(read_json(path), str(path), SCHEMA, "make the round anew")
 
 
+def _content(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None
+
+
 def check_kept(directory: str | Path, told: dict[str, Any]) -> None:
-    """Hold what was kept against the hashes that were handed out."""
+    """Hold what was kept, and the cases' own files, against the hashes that were handed out.
+
+    The side file of a drift answer tells nothing that is not handed out, so it has to be that one.
+    """
     path = Path(directory) / "kept" / "key.json"
     if not path.is_file():
         raise InputError(f"{path}: no such file; only who keeps a round's answers can score it")
@@ -163,3 +171,12 @@ def check_kept(directory: str | Path, told: dict[str, Any]) -> None:
             files = folder.kept(case)
             if commitment(salt, files) != values["answer_sha256"]:
                 raise InputError(f"{files[0]}: is not the answer that round.json binds; it was changed")
+            # Rounds that were made before cases were bound state no hash of them.
+            cases = TrackFolder(Path(directory), track).cases / case
+            if "files_sha256" in values and case_stamp(cases) != values["files_sha256"]:
+                raise InputError(
+                    f"{cases}: holds other files than round.json binds; put back what was handed out"
+                )
+            side = files[0].with_suffix(".yaml")
+            if track == "drift" and _content(side) != _content(cases / side.name):
+                raise InputError(f"{side}: is not {cases / side.name}, as it was made; one was changed")

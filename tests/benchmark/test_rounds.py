@@ -16,7 +16,7 @@ from fogml.benchmark.make import DriftCase, make_round, write_round
 from fogml.benchmark.rounds import RoundDesign, TrackFolder
 from fogml.benchmark.score import DriftMark, _told_unknown, drift_figures, geometric_mean, score_round
 from fogml.blind.folders import case_files
-from fogml.blind.run import run_cases
+from fogml.blind.run import case_stamp, run_cases
 from fogml.blind.scoring.answers import NAMED
 from fogml.cli.main import app
 from fogml.errors import InputError
@@ -161,6 +161,25 @@ def test_an_answer_that_was_changed_after_it_was_bound_is_refused(made: Path, tm
         score_round(other)
 
 
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("handout/drift/0001/fit-1.csv", "0001: holds other files than round.json binds"),
+        ("handout/drift/0001/held-out-1.yaml", "0001: holds other files than round.json binds"),
+        ("handout/diagnosis/0001/held-out-1.csv", "0001: holds other files than round.json binds"),
+        ("kept/drift/0001/held-out-1.yaml", "held-out-1.yaml: is not .*as it was made"),
+    ],
+)
+def test_no_file_that_a_score_reads_can_be_changed_unseen(
+    made: Path, tmp_path: Path, file: str, message: str
+) -> None:
+    """An offset in a training run would make doing nothing worse, another latitude move the reference."""
+    path = shutil.copytree(made, tmp_path / "other") / file
+    path.write_text((path.read_text() if path.exists() else "") + "latitude: 60.0\ninput_axis: up\n")
+    with pytest.raises(InputError, match=message):
+        score_round(tmp_path / "other")
+
+
 def test_a_closed_round_states_no_seed_and_hashes_by_a_salt_of_its_own(tmp_path: Path) -> None:
     suite = make_suite(tmp_path / "suite", [HandMade("nothing")])
     case = DriftCase("own", "1", (chamber_run("a", 1, (0.0, 9.0)),), chamber_run("b", 2, (9.0, 0.0)), 100.0)
@@ -221,8 +240,10 @@ def test_an_answer_to_a_case_that_is_another_one_by_now_is_not_scored(made: Path
     shutil.rmtree(home / "entries")
     assert run_cases(entry_plan(home, "drift", "mean")) == (1, 0)
     assert score_round(home, ["mean"])["drift"]["mean"]["figures"]["all"]["failed"] == 0
-    side = drift.cases / "0001" / "fit-1.yaml"
-    side.write_text(side.read_text() + "notes: another\n" if side.exists() else "notes: another\n")
+    outcome = drift.answers("mean") / "0001" / "outcome.json"
+    told = json.loads(outcome.read_text())
+    (key,) = (key for key, value in told.items() if value == case_stamp(drift.cases / "0001"))
+    outcome.write_text(json.dumps({**told, key: "0" * 64}))
     with pytest.raises(InputError, match="answers other files than"):
         score_round(home, ["mean"])
 
