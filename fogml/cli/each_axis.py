@@ -120,7 +120,7 @@ def axis_folders(model: str) -> list[str]:
 
 def _check_models(settings: Settings, axes: tuple[str, ...]) -> None:
     """Refuse before anything is written where an axis has no model."""
-    from fogml.models.saved import load_model
+    from fogml.cli.runs import open_model
 
     model = getattr(settings, "model", None)
     for axis in axes if model is not None else ():
@@ -130,4 +130,4 @@ def _check_models(settings: Settings, axes: tuple[str, ...]) -> None:
                 f"{model}: holds no folder '{axis}', and the run holds the axes {', '.join(axes)}; name the "
                 "folder that 'fogml train' wrote for a file of three axes, or one axis with --axis"
             )
-        load_model(folder)
+        open_model(folder, Terminal(quiet=True))  # its own job tells

@@ -14,7 +14,7 @@ from fogml.cli.lab import (
     NorthSettings,
     RateSettings,
 )
-from fogml.cli.runs import Check, no_check, open_each, open_noise, open_run, open_runs, tell
+from fogml.cli.runs import Check, no_check, open_each, open_model, open_noise, open_run, open_runs, tell
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, known_are
 from fogml.lab.misalignment_input import read_measurements
@@ -164,10 +164,11 @@ def _print_north(values: dict[str, Any], terminal: Terminal) -> None:
 def acceptance_and_write(settings: AcceptanceSettings, terminal: Terminal) -> bool:
     """Test a gyro's runs, write the report where a folder is named, print it; whether all limits are met."""
     from fogml.lab.acceptance import ACCEPTED, NO_LIMITS
-    from fogml.models.saved import load_model
 
     values = write_report(
-        settings, terminal, lambda: None if settings.model is None else load_model(settings.model)
+        settings,
+        terminal,
+        lambda: None if settings.model is None else open_model(settings.model, terminal),
     )
     return values["verdict"] in (ACCEPTED, NO_LIMITS)
 

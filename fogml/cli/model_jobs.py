@@ -15,7 +15,7 @@ import numpy as np
 from fogml.arrays import IntArray
 from fogml.cli.each_axis import axis_folders
 from fogml.cli.model_commands import CompensateSettings, ExportJobSettings
-from fogml.cli.runs import note_wrong, open_blocks, open_runs
+from fogml.cli.runs import note_wrong, open_blocks, open_model, open_runs
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.json_files import write_json
@@ -34,7 +34,6 @@ _WORDS = ("good", "outside training", "window or memory not settled")
 
 def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> None:
     """Compensate a run block by block into a file, and print how many samples got which flag."""
-    from fogml.models.saved import load_model
     from fogml.runs.checks import check_run
 
     assert settings.run and settings.model and settings.out
@@ -44,7 +43,7 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     begun = list(islice(blocks, 1))
     for first in begun:
         note_wrong(first.name, check_run(first), terminal)
-    model = load_model(settings.model)
+    model = open_model(settings.model, terminal)
     total = _expected_rows(settings.run)
     with (
         settings.written_beside(out, "compensate"),
@@ -143,10 +142,9 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
     from fogml.export.export import export_model
     from fogml.export.settings import TABLE_TARGETS, ExportSettings
     from fogml.export.tables import TableSettings, export_tables
-    from fogml.models.saved import load_model
 
     with whole_folder(settings.out) as folder:
-        models = [load_model(path) for named in settings.model for path in axis_folders(named)]
+        models = [open_model(path, terminal) for named in settings.model for path in axis_folders(named)]
         _check_form(settings, len(models))
         train = _training_runs(settings, models, terminal)
         wanted = ExportSettings(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.cli.run_commands import MonitorSettings
-from fogml.cli.runs import check_named_once, note_wrong, open_run
+from fogml.cli.runs import check_named_once, note_wrong, open_model, open_run
 from fogml.cli.terminal import UNITS_SHOWN, Terminal
 from fogml.errors import InputError, counted, in_one_line
 from fogml.fleet.tasks import FAILED, FLEET
@@ -97,7 +97,7 @@ def _records(settings: MonitorSettings, terminal: Terminal) -> tuple[list[RunRec
     """What is kept of each run, and why others can't be used; an error where none can."""
     assert settings.model
     check_named_once(settings.runs)
-    model_of = _models(Path(settings.model))
+    model_of = _models(Path(settings.model), terminal)
     records, refused = [], dict[str, str]()
     with terminal.work("monitoring", total=len(settings.runs)) as work:
         for path in settings.runs:
@@ -126,12 +126,10 @@ def _record(
     return record_run(model_of(run), run, averaging_s=averaging_s, any_unit=any_unit)
 
 
-def _models(place: Path) -> Callable[[Run], DriftModel]:
+def _models(place: Path, terminal: Terminal) -> Callable[[Run], DriftModel]:
     """What gives a run's model: one for all, or of a fleet's results that of its unit and axis."""
-    from fogml.models.saved import load_model
-
     if not (place / FLEET).is_file():
-        model = load_model(place)
+        model = open_model(place, terminal)
         return lambda run: model
     fleet: dict[str, Any] = read_json(place / FLEET, "name the folder of a fleet's results")
     try:
@@ -144,7 +142,7 @@ def _models(place: Path) -> Callable[[Run], DriftModel]:
         }
     except (KeyError, TypeError, AttributeError):
         raise InputError(f"{place / FLEET}: lists no units; run the fleet again") from None
-    load = cache(load_model)
+    load = cache(lambda folder: open_model(folder, terminal))
 
     def of_run(run: Run) -> DriftModel:
         unit, axis = run.facts.unit or "", run.facts.axis or ""

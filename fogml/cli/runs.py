@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fogml.cli.given import load
 from fogml.cli.options import Repairing
@@ -19,6 +20,9 @@ from fogml.outputs import whole_folder
 from fogml.runs.findings import DEAD, FIRST_OF_ALL, Finding, beside_drift, first_of_all
 from fogml.runs.names import renamed
 from fogml.runs.run import Run
+
+if TYPE_CHECKING:
+    from fogml.models.base import DriftModel
 
 Check = Callable[[Sequence[Run]], None]
 """Refuses runs that are not those a job is meant to have."""
@@ -44,6 +48,18 @@ def open_run(path: str, *, repair: Repairing = False, axis: str | None = None) -
     if not path.startswith(SHIPPED):
         return read_run(path, repair=bool(repair), axis=axis, most_dropped=most_dropped(repair))
     return OneAxis(axis).run(shipped_run(path.removeprefix(SHIPPED)))
+
+
+def open_model(folder: str | Path, terminal: Terminal) -> DriftModel:
+    """The saved model of a folder; what a user of it is warned of is a line on stderr."""
+    from fogml.models.saved import load_model
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", UserWarning)
+        model = load_model(folder)
+    for each in told:
+        terminal.note(str(each.message))
+    return model
 
 
 def open_legs(path: str, *, repair: Repairing = False, axis: str | None = None) -> list[Run]:

@@ -20,6 +20,7 @@ is read back.
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -151,6 +152,11 @@ def load_model(folder: str | Path) -> DriftModel:
     ------
     InputError
         If a file is missing, not of this schema, or anything was changed since the model was saved.
+
+    Warns
+    -----
+    UserWarning
+        If a model of fogml 0.1 has features with windows: while these fill, its drift is now another.
     """
     folder = Path(folder)
     if folder.name == MODEL_FILE:
@@ -190,6 +196,14 @@ def load_model(folder: str | Path) -> DriftModel:
             raise InputError("keys 'parameters' and 'bytes' are not those of the weights")
     except InputError as error:
         raise InputError(f"{path}: {error}; train it again") from None
+    features, version = model.features_, document.card["fogml_version"]
+    if features is not None and features.window_s and version.startswith("0.1."):
+        warnings.warn(
+            f"{path}: made by fogml {version}, whose rates were 0 until their window was full; now they "
+            f"begin at once. In the first {features.window_s:g} s of a run and after a gap (flag 2) its "
+            "drift is another than then, else the same; train it again",
+            stacklevel=2,
+        )
     return model
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from fogml.json_files import content_hash
 from fogml.models.saved import load_model
 from fogml.runs.reading import read_run
 from fogml.runs.shipped import shipped_run
@@ -98,6 +99,21 @@ def test_a_key_added_to_a_model_file(invoke, model, run_files, tmp_path):
     path.write_text(json.dumps({**json.loads(path.read_text()), "extra": 1}))
     result = invoke("compensate", run_files[1], "--model", model, "-o", tmp_path / "out.csv", status=2)
     assert "changed" in result.stderr
+
+
+def test_a_model_of_the_first_version_says_what_is_another(invoke, model, run_files, tmp_path):
+    path = model / "model.json"
+    document = json.loads(path.read_text())
+    document["card"]["fogml_version"] = "0.1.0"
+    del document["sha256"]
+    weights = (model / "weights.safetensors").read_bytes()
+    document["sha256"] = content_hash(document, {"weights.safetensors": weights})
+    path.write_text(json.dumps(document))
+    asked = ("compensate", run_files[1], "--model", model, "-o", tmp_path / "out.csv")
+    told = " ".join(invoke(*asked).stderr.split())
+    assert told.count("made by fogml 0.1.0") == 1 and "In the first 128 s of a run" in told
+    assert "Warning" not in told
+    assert invoke(*asked, "--quiet").stderr == ""
 
 
 def test_a_fault_late_in_the_run_leaves_nothing(invoke, model, run_files, tmp_path):

@@ -19,6 +19,7 @@ from safetensors.numpy import load_file, save_file
 
 import fogml
 from fogml.errors import InputError
+from fogml.features.features import Features
 from fogml.json_files import content_hash
 from fogml.models.compensation import compensate_blocks
 from fogml.models.feature_model import FeatureModel
@@ -201,6 +202,29 @@ def test_a_model_without_the_hash_of_earlier_versions_is_told(folder):
     edited(folder, lambda document: document.update(schema="fogml.model/1"))
     with pytest.raises(InputError, match="kept no hash of the whole model; train it again"):
         load_model(folder)
+
+
+def of_the_first_version(document):
+    document["card"]["fogml_version"] = "0.1.0"
+
+
+@pytest.mark.parametrize(("features", "span_s"), [("T, dT", 128), ("T, dT[exp, 50 s]", 150)])
+def test_a_model_whose_windows_gave_nothing_until_they_were_full_says_so(train, tmp_path, features, span_s):
+    save_model(FeatureModel(features, LinearRegressor()).fit(train), tmp_path)
+    with pytest.warns(UserWarning, match=f"made by fogml 0.1.0, .* first {span_s} s .*; train it again"):
+        loaded = load_model(edited(tmp_path, of_the_first_version))
+    # As 0.1.0 predicts: without a rate while the window fills.
+    T, rate = (Features(text).transform(train)[:, 0] for text in features.split(", ", 1))
+    rate[train.time < train.time[0] + span_s - 1.0] = 0.0
+    first = loaded.regressor_.intercept_ + np.column_stack([T, rate]) @ loaded.regressor_.coef_
+    off = np.abs(loaded.predict(train) - first) > 1e-9
+    assert off.any() and train.time[off].max() < train.time[0] + span_s
+
+
+@pytest.mark.parametrize("features", ["T, T^2", "T, dT[first]", "T, lag(T, 60 s)"])
+def test_a_model_of_the_first_version_without_windows_says_nothing(train, tmp_path, features):
+    save_model(FeatureModel(features, LinearRegressor()).fit(train), tmp_path)
+    assert load_model(edited(tmp_path, of_the_first_version)).card_.fogml_version == "0.1.0"
 
 
 @pytest.mark.parametrize(
