@@ -34,6 +34,10 @@ class InputError(FogmlError):
     """
 
 
+class UnknownName(InputError):
+    """A name that neither fogml nor an installed package declares."""
+
+
 def printable(text: str, longest: int = LONGEST_QUOTED) -> str:
     """Text from a file fit for a message: cut in the middle of what is too long, no control characters."""
     if len(text) > longest:

@@ -30,7 +30,7 @@ from __future__ import annotations
 from itertools import product as all_products
 from math import prod
 
-from fogml.errors import known_are, quoted
+from fogml.errors import InputError, UnknownName, known_are, quoted
 from fogml.features.atoms import Atom
 from fogml.features.operands import OperandReader
 from fogml.features.operators import DEFAULT_WINDOW, Window
@@ -78,7 +78,7 @@ class _Parser(OperandReader):
                 if self.token.text == "(" and before.kind == "name":
                     known = known_are(before.text, operator_names(), "operators")
                     hint = f"{known}, and those of packages that are installed"
-                    self.fail(f"there is no operator {quoted(before.text)}", before.at, hint)
+                    self.fail(f"there is no operator {quoted(before.text)}", before.at, hint, UnknownName)
                 self.fail(f"unexpected {self.found()}", self.token.at, "features are separated by commas")
 
     def product(self, most: int) -> list[Term]:
@@ -209,8 +209,14 @@ class _Parser(OperandReader):
         if token.kind == "number":
             return Window("block", self.length())
         if token.kind != "name" or (token.text not in METHODS and own_window(token.text) is None):
-            hint = f"known methods: {', '.join(window_names())}; e.g. dT[block, 64 s]"
-            self.fail(f"a method or a window expected, found {self.found()}", token.at, hint)
+            hint = f"known methods: {', '.join(window_names())}, and those of packages that are installed"
+            error = UnknownName if token.kind == "name" else InputError
+            self.fail(
+                f"a method or a window expected, found {self.found()}",
+                token.at,
+                f"{hint}; e.g. dT[block, 64 s]",
+                error,
+            )
         self.next += 1
         method = token.text
         comma = self.take(",")

@@ -55,13 +55,13 @@ class TokenReader:
         self.tokens.append(Token("end", "", len(text.rstrip())))
         self.next = 0
 
-    def fail(self, message: str, at: int, hint: str = "") -> NoReturn:
+    def fail(self, message: str, at: int, hint: str = "", error: type[InputError] = InputError) -> NoReturn:
         """Raise an InputError that points at a place of the text."""
         start, end = max(0, at - _SHOWN), at + _SHOWN
         before, after = "..." if start else "", "..." if end < len(self.text) else ""
         shown = before + re.sub(r"\s", " ", self.text[start:end]) + after
         lines = [f"feature text: {message}", f"  {shown}", f"  {' ' * (at - start + len(before))}^"]
-        raise InputError("\n".join([*lines, hint] if hint else lines))
+        raise error("\n".join([*lines, hint] if hint else lines))
 
     @staticmethod
     def known() -> str:

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 from fogml.arrays import FloatArray
 from fogml.entry_points import REGRESSORS as GROUP
 from fogml.entry_points import loaded, origin
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, UnknownName, quoted
 from fogml.features.features import Features
 from fogml.models.folds import FOLDS
 from fogml.models.names import MODEL_NAMES
@@ -222,9 +222,9 @@ def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]
         with asked(kind, "its from_saved does not take what is stored"):
             return kind.from_saved(values, arrays)
     if not isinstance(form, str) or form not in FORMS:
-        raise InputError(
+        raise UnknownName(
             f"regressor form {quoted(form)} is not known; known are "
-            f"{', '.join([*FORMS, SKOPS, *own_regressors()])}"
+            f"{', '.join([*FORMS, SKOPS, *own_regressors()])}, and those of packages that are installed"
         )
     module, name = FORMS[form].split(":")
     return getattr(import_module(module), name).from_saved(values, arrays)

@@ -28,7 +28,7 @@ from typing import Any
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, UnknownName, quoted
 from fogml.json_files import content_hash, json_object, json_text, read_bytes, read_json
 from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
@@ -195,7 +195,10 @@ def load_model(folder: str | Path) -> DriftModel:
         if (counted, size) != (document.parameters, document.bytes):
             raise InputError("keys 'parameters' and 'bytes' are not those of the weights")
     except InputError as error:
-        raise InputError(f"{path}: {error}; train it again") from None
+        remedy = (
+            "install the package that declares it" if isinstance(error, UnknownName) else "train it again"
+        )
+        raise InputError(f"{path}: {error}; {remedy}") from None
     features, version = model.features_, document.card["fogml_version"]
     if features is not None and features.window_s and version.startswith("0.1."):
         warnings.warn(
@@ -247,9 +250,9 @@ def model_of_form(form: str, kind: str) -> type[DriftModel]:
     home, kinds = FORMS[form]
     own = form == "features" and kind not in (kinds or ()) and kind in own_regressors()
     if kinds is not None and kind not in kinds and not own:
-        raise InputError(
-            f"kind {quoted(kind)} is no model of form '{form}'; known are {', '.join(kinds)}, "
-            "and models of other packages once they are installed"
+        others = ", and those of packages that are installed" if form == "features" else ""
+        raise (UnknownName if others else InputError)(
+            f"kind {quoted(kind)} is no model of form '{form}'; known are {', '.join(kinds)}{others}"
         )
     module, name = home.split(":")
     found: type[DriftModel] = getattr(import_module(module), name)

@@ -263,9 +263,7 @@ def load_sklearn(stored: NDArray[Any]) -> Any:
     try:
         regressor = skops.io.loads(data, trusted=trusted)
     except Exception as error:  # skops raises whatever a damaged archive leads it to
-        raise InputError(
-            f"the saved scikit-learn regressor cannot be read ({error}); train it again"
-        ) from None
+        raise InputError(f"the saved scikit-learn regressor cannot be read ({error})") from None
     if not is_regressor(regressor):
         raise InputError(f"the saved {type(regressor).__name__} is not a regressor; it is not used")
     return regressor
@@ -282,9 +280,7 @@ def _trusted(data: bytes) -> list[str]:
                 raise ValueError("it unpacks to more than it is")
         named = skops.io.get_untrusted_types(data=data)
     except Exception as error:  # as above
-        raise InputError(
-            f"the saved scikit-learn regressor cannot be read ({error}); train it again"
-        ) from None
+        raise InputError(f"the saved scikit-learn regressor cannot be read ({error})") from None
     foreign = sorted(set(named) - TYPES)
     if foreign:
         raise InputError(

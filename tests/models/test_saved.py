@@ -339,6 +339,22 @@ def test_only_registered_kinds_are_saved(train, tmp_path):
     assert not (tmp_path / "model").exists()
 
 
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda d: d.update(kind="others"),
+        lambda d: d["model"]["regressor"].update(form="others"),
+        lambda d: d["model"].update(features="T, others(T)"),
+        lambda d: d["model"].update(features="T, dT[others, 60 s]"),
+    ],
+)
+def test_what_a_package_that_is_not_installed_declares_asks_for_it(folder, edit):
+    with pytest.raises(InputError, match="'others'") as raised:
+        load_model(edited(folder, edit))
+    # To train it again asks for the package just as well.
+    assert str(raised.value).endswith("; install the package that declares it")
+
+
 @pytest.fixture(scope="module")
 def network(train):
     regressor = RBFRegressor(centres=4, tune=False, average_rows=200, prune=0.0)
