@@ -16,6 +16,7 @@ from fogml.models.base import DriftModel
 from fogml.models.folds import dealt_folds
 from fogml.models.table import run_rows
 from fogml.runs.run import Run
+from fogml.signals import large
 from fogml.signals.averages import block_averages
 
 
@@ -39,9 +40,16 @@ class TrainingRows:
     time: FloatArray
     run: IndexArray
 
-    def atoms_of(self, plan: Plan) -> FloatArray:
+    def atoms_of(self, plan: Plan, rows: slice = slice(None)) -> FloatArray:
         """Atom values of a plan with some of these atoms."""
-        return self.atoms[:, [self.plan.atoms.index(atom) for atom in plan.atoms]]
+        return self.atoms[rows][:, [self.plan.atoms.index(atom) for atom in plan.atoms]]
+
+    def left_by(self, plan: Plan) -> FloatArray:
+        """What a plan with some of these atoms leaves of the target (n,) [deg/h]."""
+        left = np.empty(len(self.target))
+        for part in large.pieces(left):
+            left[part] = self.target[part] - plan.value(plan.full_columns(self.atoms_of(plan, part)))
+        return left
 
 
 def runs_of_each(models: Sequence[DriftModel], runs: Sequence[Run]) -> list[list[Run]]:
@@ -99,8 +107,7 @@ def accuracy_loss(
         gyro = np.zeros(len(atoms))
         off = exported.value(exported.full_columns(own), gyro) - whole.value(whole.full_columns(atoms), gyro)
         return {"on": "points in the trained box", "rms_difference": float(np.sqrt(np.mean(off**2)))}
-    left = [rows.target - plan.value(plan.full_columns(rows.atoms_of(plan))) for plan in (whole, exported)]
-    return averaged_loss(rows, left, averaging_s)
+    return averaged_loss(rows, [rows.left_by(plan) for plan in (whole, exported)], averaging_s)
 
 
 def averaged_loss(rows: TrainingRows, left: Sequence[FloatArray], averaging_s: float) -> dict[str, Any]:

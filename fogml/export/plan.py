@@ -19,6 +19,7 @@ from fogml.models.base import DriftModel
 from fogml.models.compact import Compact, affine, operations_of_compact, operations_of_features
 from fogml.models.rbf.network import Network
 from fogml.runs.dropouts import RULE, DropoutRule
+from fogml.signals import large
 
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-6, 86_400.0
 """Sample intervals on board [s]: the clock counts microseconds; no unit is read more seldom than daily."""
@@ -258,15 +259,22 @@ class Plan:
 
     def full_columns(self, atoms: FloatArray) -> FloatArray:
         """Feature columns (n, k) of atoms (n, a) where all windows are full."""
-        return self.compose(self.limited(atoms, np.ones(len(atoms), dtype=np.bool_))[0])
+        columns = np.empty((len(atoms), len(self.steps)))
+        for part in large.pieces(atoms):
+            limited, _ = self.limited(atoms[part], np.ones(len(atoms[part]), dtype=np.bool_))
+            columns[part] = self.compose(limited)
+        return columns
 
     def compensated(self, atoms: AtomValues, gyro: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
         """Compensated output [deg/h] and flags, each (n,), from atoms (n, a) and the output (n,)."""
         values, full, settled = atoms
-        limited, outside = self.limited(values, full)
-        value = self.value(self.compose(limited), gyro)
-        flag = np.where(full & settled, outside.astype(np.int8), np.int8(2))
-        return (value if self.gives_rate else gyro - value), flag
+        compensated, flag = np.empty(len(values)), np.empty(len(values), np.int8)
+        for part in large.pieces(values):
+            limited, outside = self.limited(values[part], full[part])
+            value = self.value(self.compose(limited), gyro[part])
+            compensated[part] = value if self.gives_rate else gyro[part] - value
+            flag[part] = np.where(full[part] & settled[part], outside.astype(np.int8), np.int8(2))
+        return compensated, flag
 
     def value(self, columns: FloatArray, gyro: FloatArray | None = None) -> FloatArray:
         """Drift [deg/h] of feature columns (n, k), shape (n,); of a joint model the rate."""

@@ -215,5 +215,4 @@ def _loss(
             for i, run in enumerate(own)
         ]
     )
-    left = rows.target - plan.value(plan.full_columns(rows.atoms)), rows.target - bias
-    return averaged_loss(rows, left, model.intervals_.averaging_s)
+    return averaged_loss(rows, [rows.left_by(plan), rows.target - bias], model.intervals_.averaging_s)
