@@ -47,6 +47,7 @@ from fogml.models.tall_least_squares import Part
 from fogml.processes import one_thread
 from fogml.runs.columns import coil_sensor_number
 from fogml.runs.run import Run
+from fogml.signals import large
 from fogml.strict import Strict, strictly
 
 _EACH_SENSOR = "{sensor}"
@@ -175,9 +176,13 @@ class FeatureModel(DriftModel):
     def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
         """The regressor's value of the features, atoms limited to the trained box."""
         values, full, settled = atoms
-        limited, outside = self.features_.limit(values, full, linear=goes_on_linearly(self.regressor_))
+        drift, outside = np.empty(len(values)), np.empty(len(values), dtype=np.bool_)
+        linear = goes_on_linearly(self.regressor_)
+        for part in large.pieces(values, least=max(1, _PREDICTED_VALUES // len(self.features_))):
+            limited, outside[part] = self.features_.limit(values[part], full[part], linear=linear)
+            drift[part] = self._drift_at(limited)
         measure = partial(distance_outside, values, outside, self.features_)
-        return Evaluation(self._drift_at(limited), full, settled, outside, measure)
+        return Evaluation(drift, full, settled, outside, measure)
 
     def _drift_at(self, atoms: FloatArray) -> FloatArray:
         """The regressor's value [deg/h] at rows of atoms, shape (n, a); a part of them at a time."""
@@ -302,13 +307,9 @@ def shared_sensors(runs: Sequence[Run]) -> list[str]:
     """
     held = set.intersection(*[set(run.temperature_columns) for run in runs])
     numbered = sorted(number for name in held if (number := coil_sensor_number(name)) is not None)
-    if numbered:
-        return [f"T{number}" for number in numbered]
     faces: list[str] = [name for name in ("T_in", "T_out") if name in held]
-    if faces:
-        return faces
-    if "T" in held:
-        return ["T"]
+    if found := [f"T{number}" for number in numbered] or faces or [name for name in held if name == "T"]:
+        return found
     raise InputError(
         f"{runs[0].name}: the training runs share no coil temperature (T1 ..., T_in, T_out or T)"
     )
@@ -322,8 +323,7 @@ def written_out(text: str, runs: Sequence[Run]) -> str:
     terms = [term.strip() for term in re.split(r",(?![^()\[\]]*[)\]])", text)]
     fixed = [term for term in terms if _EACH_SENSOR not in term]
     each = [term for term in terms if _EACH_SENSOR in term]
-    written = [term.replace(_EACH_SENSOR, name) for name in shared_sensors(runs) for term in each]
-    return ", ".join([*fixed, *written])
+    return ", ".join(fixed + [t.replace(_EACH_SENSOR, name) for name in shared_sensors(runs) for t in each])
 
 
 def _part(rows: RunRows, features: Features) -> Part:

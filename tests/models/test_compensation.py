@@ -11,11 +11,13 @@ import pytest
 from sklearn.neighbors import KNeighborsRegressor
 
 from fogml.errors import InputError
+from fogml.models import feature_model
 from fogml.models.card import check_unit_and_axis
 from fogml.models.compensation import compensate_blocks
 from fogml.models.feature_model import FeatureModel
 from fogml.models.names import make_model
 from fogml.runs.run import Run
+from fogml.signals import large
 from fogml.testing.models import synthetic_run
 
 
@@ -115,6 +117,25 @@ def test_another_unit_is_refused_before_anything_is_done(train):
 def test_empty_blocks_are_skipped(train):
     model = FeatureModel("T, dT").fit(train)
     assert len(list(compensate_blocks(model, [train[:0], train, train[:0]]))) == 1
+
+
+@pytest.mark.parametrize("features", ["T, T^2, dT, lag(T, 60 s), play(T, 4 degC)", "T, dT, T*dT"])
+def test_limits_of_a_long_run_are_held_in_parts(monkeypatch, train, features):
+    """Beyond the trained box all atoms were copied, for a linear model twice."""
+    model = FeatureModel(features).fit(train)
+    hotter = train.with_columns(**{name: 1.2 * train.columns[name] for name in train.temperature_columns})
+    atoms, whole = model.features_.atom_values(hotter), model.evaluate(hotter)
+    assert whole.outside.any()
+    monkeypatch.setattr(large, "HELD_VALUES", 300)
+    monkeypatch.setattr(large, "PIECE", 300)
+    monkeypatch.setattr(feature_model, "_PREDICTED_VALUES", 300)
+    tracemalloc.start()
+    parted = model.evaluate_atoms(hotter, atoms)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    np.testing.assert_allclose(parted.drift, whole.drift, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(parted.outside, whole.outside)
+    assert most < parted.drift.nbytes + parted.outside.nbytes + atoms.values.nbytes
 
 
 def test_memory_does_not_grow_with_the_recording(train):
