@@ -85,7 +85,7 @@ class NoisePoints:
         grown = [end + offsets[-1] - offsets[-2] if at else end for end, at in zip(ends, at_end)]
         flicker, walk = ({*values, last} for values, last in zip(zip(*self.steps), grown))
         more = [s for s in product(sorted(flicker), sorted(walk)) if s[0] > ends[0] or s[1] > ends[1]]
-        return _points(self.prior, self.source, self.static, self.noises[0].N, more)
+        return _points(self.prior, self.source, None, self.noises[0].N, more)
 
     def and_more(self, more: NoisePoints) -> NoisePoints:
         """These and others."""

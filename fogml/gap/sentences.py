@@ -31,6 +31,7 @@ def headline(found: Inference, told: Diagnosis, other_plant: bool) -> tuple[str,
     """
     said, titles = [], found.scene.candidates
     verdict, unknown, out = told.verdict, told.unknown, beyond_noise(told.how_far)
+    slow_noise = _slow_noise(found)
     could = f"the fitted runs could show; {out}." if out else "these runs could show."
     if verdict == "no_gap" and other_plant:
         said.append(
@@ -72,7 +73,7 @@ def headline(found: Inference, told: Diagnosis, other_plant: bool) -> tuple[str,
     if verdict in ("unknown", "partly_explained"):
         like = unknown.looks_like
         said.append(f"Something acts that is not known{': it ' + like if like else ''}.")
-        if found.points.static is None and like in _in_time(found) and not _slow_noise(found):
+        if found.points.static is None and like in _in_time(found) and not slow_noise:
             said.append("Slow noise of the gyro itself looks like that: give a static run (--noise).")
         for n in [n for n in told.nearest if n.effect not in {f.effect for f in told.named}][:2]:
             if n.share >= found.setting.priors.reported.near_share:
@@ -80,8 +81,8 @@ def headline(found: Inference, told: Diagnosis, other_plant: bool) -> tuple[str,
                     f"Nearest known cause: {titles[n.effect].title}, in whatever form, holds "
                     f"{percent(n.share, 0)} of the gap."
                 )
-    if said_of_noise := _slow_noise(found):
-        said.append(said_of_noise)
+    if slow_noise:
+        said.append(slow_noise)
     runs, segments = [found.scene.runs[i].run.name for i in found.scene.in_time], told.where.segments
     first = min((runs.index(s.run) for s in segments), default=0)
     if first > 0:

@@ -308,7 +308,7 @@ def shared_sensors(runs: Sequence[Run]) -> list[str]:
     held = set.intersection(*[set(run.temperature_columns) for run in runs])
     numbered = sorted(number for name in held if (number := coil_sensor_number(name)) is not None)
     faces: list[str] = [name for name in ("T_in", "T_out") if name in held]
-    if found := [f"T{number}" for number in numbered] or faces or [name for name in held if name == "T"]:
+    if found := [f"T{number}" for number in numbered] or faces or sorted({"T"} & held):
         return found
     raise InputError(
         f"{runs[0].name}: the training runs share no coil temperature (T1 ..., T_in, T_out or T)"

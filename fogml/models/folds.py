@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 Fold = tuple[IndexArray, IndexArray]
 """Indices of the rows fitted to, and of the rows held out."""
-LEAST_SHARE = 0.25
-"""Share of a run's temperatures that others have to hold to tell it, as a unit has to of its fleet's."""
 FOLDS = 5
 BLOCKS_PER_FOLD = 4
 
@@ -97,8 +95,8 @@ def run_folds(table: TrainingTable) -> list[Fold]:
     ]
 
 
-def told_by_each_other(run_index: IndexArray, temperatures: FloatArray) -> bool:
-    """Whether there are several runs, and the others hold a quarter or more of what each runs through.
+def told_by_each_other(run_index: IndexArray, temperatures: FloatArray, *, least_share: float = 0.25) -> bool:
+    """Whether there are several runs, and the others hold enough of the temperatures each runs through.
 
     Of a cycle beside a run at one temperature, or of a cold run beside a hot one, the other says nothing:
     what a fit to it leaves there is how it goes on, not how runs differ. A run that stays at its temperature
@@ -110,6 +108,9 @@ def told_by_each_other(run_index: IndexArray, temperatures: FloatArray) -> bool:
         Run of each row, shape (n,).
     temperatures
         Temperatures [degC], shape (n, k).
+    least_share
+        Share of each run's span that the others' have to hold: as little as is asked of a unit's runs of its
+        fleet's, as over less of it a fit to them mostly goes on beyond what they show.
     """
     numbers = np.unique(run_index)
     for number in numbers:
@@ -118,7 +119,7 @@ def told_by_each_other(run_index: IndexArray, temperatures: FloatArray) -> bool:
             return False
         span = np.ptp(own, axis=0)
         shared = np.minimum(rest.max(axis=0), own.max(axis=0)) - np.maximum(rest.min(axis=0), own.min(axis=0))
-        if np.any((span >= LEAST_SPAN_DEGC) & (shared < LEAST_SHARE * span)):
+        if np.any((span >= LEAST_SPAN_DEGC) & (shared < least_share * span)):
             return False
     return len(numbers) > 1
 
