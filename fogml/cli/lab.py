@@ -76,7 +76,10 @@ class RateSettings(Settings):
     greatest: float = setting(500.0, "With --twin: greatest rate tested.", metavar="DEG/S", gt=0.0, le=1e4)
     noise: bool = setting(False, "With --twin: its noise too; else its effects alone.", "--noise/--no-noise")
     settle: float | None = setting(
-        None, "Left out at the begin of each rate (2 samples).", metavar="SECONDS", ge=0.0
+        None,
+        "Left out at the begin of each rate; as long as outputs show if none.",
+        metavar="SECONDS",
+        ge=0.0,
     )
     answers: float = setting(
         0.5, "Share of the expected output that counts.", metavar="SHARE", gt=0.0, lt=1.0

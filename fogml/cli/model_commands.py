@@ -127,12 +127,13 @@ def _one_as_text(value: list[str]) -> str | list[str]:
 class ExportJobSettings(Settings):
     """Write a model's compact form, once it has been compared with the model.
 
-    Writes fogml_model.* and export.json. C code takes raw temperatures sample by sample; it is
-    compiled and run against the model before it is written. Exit status 2, and nothing written, if
-    it differs by more than the tolerance.
+    Writes fogml_model.* (C of three axes: fogml_axes.*), export.json and export.config.yaml. C code takes
+    raw temperatures sample by sample; it is compiled and run against the model before it is written. Exit
+    status 2, and nothing written, if it differs by more than the tolerance.
 
-    Segments are a table of bias and scale factor over one temperature (CSV, JSON, C); px4 and
-    ardupilot are parameter files with a cubic. Both hold what the model says at rest.
+    Segments are a table of bias and scale factor over one temperature (CSV, JSON, C), fogml_segments.*; px4
+    and ardupilot are parameter files with a cubic, fogml_px4.params and fogml_ardupilot.param. Both hold what
+    the model says at rest.
     """
 
     job: ClassVar[str] = "fogml.cli.model_jobs:export_and_write"
@@ -156,15 +157,17 @@ class ExportJobSettings(Settings):
     )
     dtype: str | None = setting(
         None,
-        "float64, float32, float16, int8, q15 or q31.",
+        "float64, float32, float16, int8, q15 or q31 (float32 of C and tables, else float64).",
         metavar="TYPE",
         known=("float64", "float32", "float16", "int8", "q15", "q31"),
     )
-    bytes: int | None = setting(None, "Leave out centres until the weights fit N bytes.")
+    bytes: int | None = setting(None, "Leave out centres or terms until the weights fit N bytes.")
     with_pipeline: bool = setting(
         False, "ONNX from the temperatures' window.", "--with-pipeline/--features-only"
     )
-    tolerance: float | None = setting(None, "Largest difference from the model allowed.", metavar="DEG/H")
+    tolerance: float | None = setting(
+        None, "Largest difference from the model allowed; a share of its interval if none.", metavar="DEG/H"
+    )
     sample_s: float | None = setting(
         None, "Sample interval on board; that of training if none.", metavar="SECONDS"
     )

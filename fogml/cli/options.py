@@ -132,7 +132,7 @@ CostOfFalseName = Annotated[
 NextRun = Annotated[
     bool,
     option(
-        "Look for the programme of a run that would tell more; no takes half the time.",
+        "Look for the programme of a run that would tell more; half of the time may go into it.",
         "--next-run/--no-next-run",
     ),
 ]

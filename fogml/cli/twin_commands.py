@@ -101,8 +101,9 @@ class DiagnoseSettings(Settings):
     )
     held_out: list[str] = setting(
         [],
-        "Run for the final figure; may be repeated.",
-        metavar="RUN",
+        "Runs for the final figure; takes several, may be repeated.",
+        metavar="RUN...",
+        spread=True,
         **options.RUN,
     )
     noise: str | None = setting(None, "Static run of the unit, for its noise.", metavar="RUN", **options.RUN)
@@ -132,7 +133,8 @@ class PlanSettings(Settings):
     """Programmes that make wanted parameters identifiable, with expected standard errors.
 
     Searches rates, limits, soaks, a minor loop, table rates, power steps, fan and yaw. Writes
-    programme.yaml for fogml simulate, plan.json, plan.html and plan.config.yaml.
+    programme.yaml, simulation.yaml (it with the mounting planned, for fogml simulate), plan.json, plan.html
+    and plan.config.yaml.
     """
 
     job: ClassVar[str] = "fogml.cli.plan_job:plan_and_write"

@@ -66,7 +66,7 @@ def rate_json(
     source
         What they are, for the page.
     settle_s
-        Left out at the begin of each plateau [s]; the first rows if None.
+        Left out at the begin of each plateau [s]; as `fogml.lab.rate_pieces.find_plateaus` has it if None.
     criteria
         What counts as following; those of IEEE Std 952 if None.
     twin

@@ -25,6 +25,7 @@ _EXAMPLES = {
     "powered_on": "0.0",
     "started": "2026-03-02T08:00:00Z",
     "in_use_since": "2026-01-15T08:00:00Z",
+    "compensated": "true",
 }
 SYNTHETIC = "synthetic"
 """What the notes of a simulated run begin with."""

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from fogml.cli import settings as settings_module
-from fogml.cli.command import spread_values
+from fogml.cli.command import SettingsCommand, spread_values
 from fogml.cli.lab import NorthSettings
 from fogml.cli.model_commands import (
     CompareSettings,
@@ -20,8 +20,8 @@ from fogml.cli.model_commands import (
     TrainSettings,
 )
 from fogml.cli.run_commands import ImportSettings
-from fogml.cli.settings import Settings
-from fogml.cli.twin_commands import PlanSettings, ReplaySettings, SimulateSettings
+from fogml.cli.settings import Settings, given_settings
+from fogml.cli.twin_commands import DiagnoseSettings, PlanSettings, ReplaySettings, SimulateSettings
 from fogml.errors import InputError
 from fogml.runs.reading import read_run
 from fogml.yaml_text import parse_yaml
@@ -181,6 +181,21 @@ def test_a_name_after_a_joined_value_is_not_guessed_to_be_a_training_run() -> No
     for given in (["--test=b", "c"], ["a", "--test", "b", "--test=c", "d"]):
         with pytest.raises(InputError, match=r"write '--test . .' if it does, else name it before --test"):
             spread_values(given, "--test")
+
+
+def test_runs_after_an_option_are_none_of_the_command_s_own() -> None:
+    """Of ``--held-out c d`` d was fitted to, in silence."""
+    command = SettingsCommand("diagnose", DiagnoseSettings)
+    told = command.make_context("diagnose", ["a", "--held-out", "c", "d"])
+    assert (told.params["runs"], told.params["held_out"]) == (("a",), ("c", "d"))
+    for kind in kinds_of_settings():
+        lists = {
+            key: given
+            for key, given in given_settings(kind).items()
+            if given.reads and "list[" in str(kind.model_fields[key].annotation)
+        }
+        if any(given.argument for given in lists.values()):
+            assert all(given.argument or given.spread for given in lists.values()), kind
 
 
 def kinds_of_settings() -> list[type[Settings]]:

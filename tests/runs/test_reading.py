@@ -214,6 +214,7 @@ class TestFacts:
             ("input_axis: {heading: .inf}", "input_axis"),
             ("scale_factor: 3", "scale_factor.*value: 1.0"),
             ("scale_factor: {value: 0}", "scale_factor.*0"),
+            ("compensated: yes", "yes.*compensated: true"),
             ('scale_factor: {value: 1, unit: "V"}', "count per deg/h"),
             ("started: 2026-13-45", "started.*ISO 8601"),
             ("started: 20260302", "started.*20260302.*2026-03-02T08"),

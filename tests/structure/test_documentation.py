@@ -6,6 +6,7 @@ import doctest
 import re
 import shlex
 import tomllib
+from collections.abc import Iterable
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +19,9 @@ from experiments.guide_commands.__main__ import NEEDS_NETWORK, ROOT, blocks_of, 
 from fogml.cli.docs_job import page_names
 from fogml.cli.main import app
 from fogml.features.parse import parse_features
+from fogml.lab.acceptance_rows import BY_KEY
 from fogml.runs.shipped import shipped_names
+from fogml.validation.limits import QUANTITIES
 
 CODE = Path(fogml.__file__).parent
 PAGES = pages()
@@ -118,6 +121,12 @@ def test_every_schema_that_is_read_or_compared_is_named() -> None:
         written |= set(re.findall(r"\"(fogml\.[a-z_]+/\d+)\"", path.read_text(encoding="utf-8")))
     assert named - {"fogml.blind_uses/1"} <= written
     assert not written - named
+
+
+@pytest.mark.parametrize(("page", "known"), [("acceptance.md", BY_KEY), ("figures.md", QUANTITIES)])
+def test_figures_that_may_have_a_limit_are_named(page: str, known: Iterable[str]) -> None:
+    told = TEXTS[ROOT / "docs" / page].partition("Figures that may have")[2].partition("\n\n")[0]
+    assert set(re.findall(r"`(\w+)`", told)) == set(known)
 
 
 def test_links_lead_somewhere() -> None:
