@@ -256,6 +256,10 @@ def _print_export(
     ]
     if (proven := report.get("fixed_point", {}).get("largest_difference_proven")) is not None:
         rows.append(["fixed point there, by proof", f"at most {short(proven, 2)} deg/h"])
+    if fixed := report.get("fixed_point"):
+        unit = fixed["compensated_unit_deg_h"]
+        told = f"steps of {short(unit, 2)} deg/h, up to {short(2.0**31 * unit / 3600.0)} deg/s either way"
+        rows.append(["outputs", told])
     if report["operations_per_sample"] is not None:
         rows.append(["operations per sample", str(report["operations_per_sample"])])
     if pruning := report.get("pruning"):

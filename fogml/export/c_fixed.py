@@ -20,7 +20,6 @@ from fogml.export.c_float import TYPES, array, box_lines, edge_lines, sensor_ide
 from fogml.export.c_own import fixed_number, function_atoms, own_constants, own_context
 from fogml.export.fixed_scales import (
     HELD_BITS,
-    OUTPUT_BITS,
     SIGNAL_SHIFT,
     VALUE_BITS,
     Scales,
@@ -50,30 +49,30 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     from fogml.export.c_source import units_of
 
     scales = Scales(plan, dtype)
-    bits = scales.temperature_bits
+    bits, output_bits = scales.temperature_bits, scales.output_bits
+    most = 2 ** (31 - output_bits)
     fixed = {
         "temperature_unit": f"{2.0**-bits!r}",
         "temperature_value": 2.0**-bits,
         "temperature_most": 2.0 ** (15 if dtype == "q15" else 31) - 1.0,
         "gyro_value": 2.0**-scales.gyro_bits,
         "gyro_unit": repr(2.0**-scales.gyro_bits),
-        "compensated_value": 2.0**-OUTPUT_BITS,
-        "compensated_unit": repr(2.0**-OUTPUT_BITS),
-        "compensated_most": f"{2 ** (31 - OUTPUT_BITS)}.0",
+        "compensated_value": 2.0**-output_bits,
+        "compensated_unit": repr(2.0**-output_bits),
+        "compensated_most": f"{most}.0",
         "atom_bits": scales.atoms.tolist(),
         "column_bits": scales.columns.tolist(),
         "drift_bits": scales.drift,
         "signal_note": f", steps of 2^-{HELD_BITS}",
-        "output_note": f", steps of 2^-{OUTPUT_BITS}",
+        "output_note": f", steps of 2^-{output_bits}",
     }
     gyro = (
         f"[{plan.gyro_unit}]"
         if plan.gives_rate and plan.gyro_unit == "count"
-        else f"output as rate, whole steps of 2^-{OUTPUT_BITS} deg/h"
+        else f"output as rate, whole steps of 2^-{output_bits} deg/h"
     )
-    most = 2 ** (31 - OUTPUT_BITS)
     compensated = [
-        f"Outputs are whole steps of 2^-{OUTPUT_BITS} deg/h; the units are defined below. They hold {most}",
+        f"Outputs are whole steps of 2^-{output_bits} deg/h; the units are defined below. They hold {most}",
         f"deg/h ({most / 3600.0:.0f} deg/s) either way; what lies beyond stays at that end, without a flag.",
     ]
     units = units_of(plan, gyro, f"whole steps of 2^-{bits} degC, in the order of the places below")
@@ -237,7 +236,7 @@ def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[
     constant = round(float(arrays["constant"][0]) * 2.0**scales.drift)
     lines += [
         "",
-        f"#define DRIFT_SHIFT {scales.drift - OUTPUT_BITS}",
+        f"#define DRIFT_SHIFT {scales.drift - scales.output_bits}",
         f"#define CONSTANT INT64_C({constant}) /* steps of 2^-{scales.drift} deg/h */",
     ]
     stored = "int16_t" if dtype == "q15" else "int32_t"

@@ -31,7 +31,7 @@ from fogml.runs.run import Run
 READING_STEP_DEGC = 1.0 / 16.0
 """Steps of a thermometer in use, a DS18B20's, in which a history is read where windows are held in bins."""
 _BEYOND = 0.2
-_TURN_DEG_H = 36_000.0
+TURN_DEG_H = 36_000.0
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Difference:
     flags
         Samples of the history whose flag differs.
     scale_ppm
-        Of a joint model, the difference at 10 deg/s as a share of that.
+        Of a joint model, the differences at 10 and -10 deg/s from each other, as a share of 20 deg/s.
     """
 
     inside: float
@@ -122,19 +122,28 @@ def c_difference(
 
     rng, steps = np.random.default_rng([seed, 4]), _reading_steps(plan, source)
 
-    def at(gyro: float, beyond: float = 0.0) -> float:
-        gyro = float(np.round(gyro / gyro_step) * gyro_step) if gyro_step else gyro
+    def at(gyro: float, less: float | None = None, beyond: float = 0.0) -> float:
+        gyro, *others = (
+            float(np.round(one / gyro_step) * gyro_step) if gyro_step else one
+            for one in (gyro, less)
+            if one is not None
+        )
 
         def off(atoms: FloatArray) -> FloatArray:
             read = atoms + rng.choice([-0.5, 0.5], (len(atoms), len(steps))) @ steps
-            return _atoms_off(plan, source, program, atoms, read, gyro)
+            found = _atoms_off(plan, source, program, atoms, read, gyro)
+            # What differs between two outputs is of the scale factor, and no bias.
+            for other in others:
+                found -= _atoms_off(plan, source, program, atoms, read, other)
+            return np.abs(found)
 
         return largest_in_box(plan, off, seed, beyond)
 
     output = output_size(plan)
-    near, far, ppm = at(output), at(output, _BEYOND), None
+    near, far, ppm = at(output), at(output, beyond=_BEYOND), None
     if plan.gives_rate:
-        ppm = 1e6 * at(float(_TURN_DEG_H / plan.arrays["scale"][0])) / _TURN_DEG_H
+        turn = float(TURN_DEG_H / plan.arrays["scale"][0])
+        ppm = 1e6 * at(turn, -turn) / (2.0 * TURN_DEG_H)
     return Difference(max(inside, near), max(outside, far), POINTS, len(off), good, differ, ppm)
 
 
@@ -182,7 +191,7 @@ def _reading_steps(plan: Plan, source: CSource) -> FloatArray:
 def _atoms_off(
     plan: Plan, source: CSource, program: CProgram, atoms: FloatArray, read: FloatArray, gyro: float
 ) -> FloatArray:
-    """How far C of atoms as they are `read` is from the plan of the `atoms` [deg/h], shape (n,)."""
+    """C of atoms as they are `read` less the plan of the `atoms` [deg/h], shape (n,)."""
     fixed = source.numbers["fixed"]
     output = np.full(len(atoms), gyro)
     everywhere = np.ones(len(atoms), dtype=np.bool_)
@@ -191,10 +200,10 @@ def _atoms_off(
         output, expected = 2.0 * output - expected, output
     if fixed is None:
         out, _ = program.atoms(read, output)
-        return np.abs(out.astype(np.float64) - expected)
+        return np.asarray(out.astype(np.float64) - expected)
     whole = np.round(read * 2.0 ** np.array(fixed["atom_bits"]))
     out, _ = program.atoms(np.clip(whole, 1 - 2**31, 2**31 - 1), np.round(output / fixed["gyro_value"]))
-    return np.abs(out * fixed["compensated_value"] - expected)
+    return np.asarray(out * fixed["compensated_value"] - expected)
 
 
 def direction_flip(plan: Plan, seed: int) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from fogml.export.check import (
 from fogml.export.documentation import DOCUMENTATION_FILE, card_lines, documentation, export_card
 from fogml.export.false_readings import false_reading_lines, false_readings
 from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
+from fogml.export.fixed_scales import output_bits
 from fogml.export.layout import layout
 from fogml.export.losses import TrainingRows, accuracy_loss, training_rows
 from fogml.export.plan import Plan
@@ -85,6 +87,9 @@ def export_model(
     if settings.to == "c":
         # What C can't hold is refused before anything is computed: its histories may be endless.
         layout(whole, number_of(dtype))
+        if number_of(dtype) == "fixed":
+            asked = (tolerance_of(model, one, dtype) for one in (settings, replace(settings, tolerance=None)))
+            whole = replace(whole, output_bits=output_bits(min(asked)))
     _agreeing(whole, model, settings.seed)
     rows = training_rows(model, whole, train) if train else None
     plan, pruning = _pruned(whole, settings, dtype, rows)

@@ -17,7 +17,6 @@ from fogml.export.c_own import KERNEL_BITS, kernel_steps
 from fogml.export.false_readings import atom_gain
 from fogml.export.fixed_scales import (
     HELD_BITS,
-    OUTPUT_BITS,
     SIGNAL_SHIFT,
     VALUE_BITS,
     Scales,
@@ -59,7 +58,7 @@ def fixed_point_error(plan: Plan, windows: Layout, dtype: str) -> float | None:
         return None
     columns = _column_errors(plan, scales, atoms)
     unit, arrays = 0.5 * 2.0**-scales.drift, plan.arrays
-    total = unit + 0.5 * 2.0**-OUTPUT_BITS
+    total = unit + 0.5 * 2.0**-scales.output_bits
     taken = 0.0 if plan.gives_rate and plan.gyro_unit == "count" else 0.5 * 2.0**-scales.gyro_bits
     if "linear" in arrays:
         linear = np.abs(arrays["linear"])

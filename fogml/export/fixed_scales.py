@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from math import floor, frexp, log2
+from math import ceil, floor, frexp, log2
 
 import numpy as np
 
 from fogml.arrays import FloatArray, IntArray
 from fogml.errors import InputError
-from fogml.export.plan import Plan
+from fogml.export.plan import LEAST_OUTPUT_BITS, MOST_OUTPUT_BITS, Plan
 from fogml.export.self_test import sensor_range
 
-OUTPUT_BITS = 12
-"""Outputs are multiples of 2**-12 deg/h."""
 VALUE_BITS = 30
 HELD_BITS = 20
 SIGNAL_SHIFT = 24
@@ -39,7 +37,8 @@ class Scales:
         self.most = np.array([max(abs(a), abs(b)) for a, b in ranges])
         self.columns = np.array([fitting_bits(value) for value in self.most], dtype=np.int64)
         self.temperature_bits = 22 if dtype == "q31" else sixteen_bits(plan)
-        self.gyro_bits = 0 if plan.gives_rate and plan.gyro_unit == "count" else OUTPUT_BITS
+        self.output_bits = plan.output_bits
+        self.gyro_bits = 0 if plan.gives_rate and plan.gyro_unit == "count" else self.output_bits
         arrays = plan.arrays
         linear = arrays.get("linear", np.empty(0))
         self.linear, self.linear_bits = mantissas(linear, self.stored_bits)
@@ -59,11 +58,20 @@ class Scales:
             drift.append(self.scale_bits + self.gyro_bits)
             total += float(abs(arrays["scale"][0])) * 2.0**31 / 2.0**self.gyro_bits
         self.drift = min([*drift, floor(_SUM_BITS - log2(max(total, 1e-6)))])
-        if self.drift < OUTPUT_BITS:
+        if self.drift < self.output_bits:
             raise InputError(
                 "export: the model's terms are so large, and cancel so finely, that fixed point cannot hold "
                 f"them ({dtype}); use float32, or train with lower powers"
             )
+
+
+def output_bits(tolerance_deg_h: float) -> int:
+    """Bits behind the point of outputs that may be so far off [deg/h]; fewer hold faster turns.
+
+    Rounding an output where it is taken and where it is given makes a step, which is a quarter of it then.
+    """
+    needed = ceil(log2(4.0 / tolerance_deg_h)) if tolerance_deg_h > 0.0 else MOST_OUTPUT_BITS
+    return min(max(needed, LEAST_OUTPUT_BITS), MOST_OUTPUT_BITS)
 
 
 def fitting_bits(most: float) -> int:

@@ -23,6 +23,8 @@ from fogml.signals import large
 
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-6, 86_400.0
 """Sample intervals on board [s]: the clock counts microseconds; no unit is read more seldom than daily."""
+LEAST_OUTPUT_BITS, MOST_OUTPUT_BITS = 6, 12
+"""Outputs of 32 bits hold 9320 deg/s then, more than any gyro's range, and 146 deg/s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +116,8 @@ class Plan:
         Unit of the output that the model takes.
     thermometer
         What a thermometer can show; other readings are taken for none.
+    output_bits
+        Bits behind the point of outputs in fixed point, whose steps are 2**-output_bits deg/h.
     """
 
     compact: Compact
@@ -125,6 +129,7 @@ class Plan:
     sample_s: float
     gyro_unit: str = "deg/h"
     thermometer: DropoutRule = RULE
+    output_bits: int = MOST_OUTPUT_BITS
 
     @classmethod
     def of(cls, model: DriftModel, sample_s: float | None = None) -> Plan:

@@ -11,7 +11,7 @@ import numpy as np
 from fogml import __version__
 from fogml.errors import InputError, known_are
 from fogml.export.c_source import C_DTYPES
-from fogml.export.check import Difference
+from fogml.export.check import TURN_DEG_H, Difference
 from fogml.export.plan import Plan
 from fogml.export.storage import FILE_DTYPES
 from fogml.intervals import LEVEL
@@ -29,9 +29,8 @@ TOLERANCE_SHARE = {"float64": 1e-4, "float32": 0.01, "q31": 0.02, "q15": 0.05, "
 """Difference allowed unless stated, as a share of the model's 90 % interval half-width."""
 BINNED_SHARE = 5e-3
 """The same where windows keep samples in bins: a bin that a window's edge parts is parted along a line."""
-LEAST_TOLERANCE = {"float64": 1e-6, "float32": 1e-5, "q31": 5e-4, "q15": 1e-3, "float16": 1e-5, "int8": 1e-5}
-"""The same, at least [deg/h]."""
 _MOST_SCALE_PPM = 1.0
+"""... of a scale factor, or what makes as much as the tolerance at 10 deg/s."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def tolerance_of(model: DriftModel, settings: ExportSettings, dtype: str, binned
     if settings.tolerance is not None:
         return settings.tolerance
     share = max(TOLERANCE_SHARE[dtype], BINNED_SHARE if binned else 0.0)
-    return max(LEAST_TOLERANCE[dtype], share * float(model.intervals_.half_width(LEVEL)))
+    return share * float(model.intervals_.half_width(LEVEL))
 
 
 def check_settings(settings: ExportSettings, dtype: str) -> None:
@@ -102,15 +101,11 @@ def hold_within(
             f"the model's, more than the tolerance of {short(tolerance)} deg/h; {', or '.join(ways)}. "
             "Nothing was written"
         )
-    if (
-        difference.scale_ppm is not None
-        and settings.tolerance is None
-        and difference.scale_ppm > _MOST_SCALE_PPM
-    ):
+    ppm, most = difference.scale_ppm, max(_MOST_SCALE_PPM, 1e6 * tolerance / TURN_DEG_H)
+    if ppm is not None and settings.tolerance is None and ppm > most:
         raise InputError(
-            f"export: in {dtype} the scale factor differs by up to "
-            f"{against(difference.scale_ppm, _MOST_SCALE_PPM)} ppm, more than {_MOST_SCALE_PPM:g} ppm; "
-            "choose a finer --dtype, or state --tolerance. Nothing was written"
+            f"export: in {dtype} the scale factor differs by up to {against(ppm, most)} ppm, more than "
+            f"{short(most)} ppm; choose a finer --dtype, or state --tolerance. Nothing was written"
         )
 
 
