@@ -32,9 +32,9 @@ from fogml.report.gap_words import (
     headline,
     held_out_words,
     subject_of,
+    suspected_words,
     title_of,
     titles,
-    verdict_sentences,
     verdict_words,
 )
 from fogml.report.page import Drawing, render, template_text
@@ -54,7 +54,7 @@ def gap_page(found: Diagnosis) -> str:
         found=found,
         headline=headline(found),
         kicker=_kicker(found),
-        verdict=verdict_sentences(found),
+        said=[*found.headline, *suspected_words(found)],
         tiles=headline_tiles(found, names),
         strip=figures_gap.how_far_strip(found.how_far, bool(found.named)) if found.how_far else None,
         warnings=warnings(found, names),

@@ -36,7 +36,7 @@ def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
     tiles = [Tile("Verdict", verdict_words(found), "", _verdict_note(found), told)]
     tiles += [_cause_tile(found, names), _confidence_tile(found, names)]
     unknown = probability_words(found.unknown.probability)
-    if found.verdict != "unknown":
+    if not _is_unknown(found):
         tiles.append(Tile("Something unknown", unknown, "", "probability that no candidate explains all"))
     tiles.append(_closed_tile(found))
     return tiles
@@ -80,7 +80,7 @@ def _confidence_tile(found: Diagnosis, names: dict[str, str]) -> Tile:
         if any(len(f.members) > 1 for f in found.named) and len(found.named) == 1:
             note = "that one of them acts"
         return Tile("Confidence", probability_words(least), "", note)
-    if found.verdict == "unknown":
+    if _is_unknown(found):
         return Tile(
             "Confidence", probability_words(found.unknown.probability), "", "that something unknown acts"
         )
@@ -89,6 +89,11 @@ def _confidence_tile(found: Diagnosis, names: dict[str, str]) -> Tile:
         return Tile("Likeliest effect", "under 1 %", "", f"any of {plural(len(found.evidence), 'candidate')}")
     title = title_of(likeliest.effect, names)
     return Tile("Likeliest effect", probability_words(likeliest.probability), "", title)
+
+
+def _is_unknown(found: Diagnosis) -> bool:
+    """Whether something unknown is likelier than not all that acts."""
+    return found.verdict == "unknown" and found.unknown.probability >= 0.5
 
 
 def _closed_tile(found: Diagnosis) -> Tile:

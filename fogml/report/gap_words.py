@@ -6,16 +6,7 @@ from collections.abc import Sequence
 
 from fogml.gap.result import Diagnosis, Estimate, Found, in_doubt
 from fogml.gap.result_parts import HowFar, beyond_noise
-from fogml.numerals import (
-    averages,
-    listed,
-    number,
-    percent,
-    plural,
-    probability_words,
-    unit_words,
-    with_error,
-)
+from fogml.numerals import listed, percent, probability_words, unit_words, with_error
 from fogml.twin.registry import effects
 
 _LIKELY_MEMBERS = 4
@@ -95,103 +86,13 @@ def headline(found: Diagnosis) -> str:
             return f"Unknown: the gap is there, and no candidate {told}"
 
 
-def verdict_sentences(found: Diagnosis) -> list[str]:
-    """What the verdict means here, the most important first."""
+def suspected_words(found: Diagnosis) -> list[str]:
+    """The likely causes that are not sure enough for a name, in a sentence; none where there are none."""
+    if not found.suspected:
+        return []
     names = titles(found)
-    sentences = [_first(found, names)]
-    if found.verdict in ("explained", "ambiguous", "partly_explained"):
-        alike = [f for f in found.named if len(f.members) > 1]
-        if alike:
-            sentences += [
-                f"{listed([title_of(m, names) for m in f.members], 5)} look alike in these runs: only "
-                "another run can tell which it is."
-                for f in alike
-            ]
-    doubted = [f for f in found.named if f.left_out]
-    unknown = f"with probability {probability_words(found.unknown.probability)}"
-    if doubted:
-        sentences += [
-            f"{listed([title_of(m, names) for m in f.left_out], 5)} would look like "
-            f"{title_of(f.effect, names)} in these runs, but was left out of the candidates: {unknown} "
-            "something acts that no candidate explains."
-            for f in doubted
-        ]
-    elif found.verdict == "partly_explained":
-        sentences.append(f"Beside, {unknown}, something acts that no candidate explains{_looks(found)}.")
-    if found.suspected:
-        told = [f"{cause_words(f, names)} ({probability_words(f.probability)})" for f in found.suspected]
-        sentences.append(f"Suspected, and not sure enough to be named: {listed(told, 5)}.")
-    sentences.append(_closing(found))
-    return [s for s in sentences if s]
-
-
-def _first(found: Diagnosis, names: dict[str, str]) -> str:
-    among = plural(len(found.evidence), "candidate effect")
-    if found.verdict == "no_gap":
-        leading = found.found[0] if found.found else None
-        most = (
-            f" The likeliest, {title_of(leading.effect, names)}, has probability "
-            f"{probability_words(leading.probability)}."
-            if leading
-            else ""
-        )
-        where = " of the fitted runs" if beyond_noise(found.how_far) else ""
-        if in_doubt(found.verdict, found.found, found.unknown):
-            return (
-                f"With its own constants fitted the twin leaves nothing that surely stands out of the noise"
-                f"{where}, and none of {among} is named; that nothing is missing is not sure either.{most} "
-                f"Something unknown acts with {probability_words(found.unknown.probability)}."
-            )
-        return (
-            f"With its own constants fitted the twin leaves nothing that stands out of the noise{where}: "
-            f"none of {among} is named.{most}"
-        )
-    if found.verdict == "unknown" and found.unknown.probability < 0.5:
-        likeliest = max(found.evidence, key=lambda e: e.probability)
-        its = probability_words(likeliest.probability)
-        return (
-            f"There is a gap beyond doubt, and none of {among} is sure to be its cause. The likeliest, "
-            f"{title_of(likeliest.effect, names)}, has probability {its}; "
-            f"with probability {probability_words(found.unknown.probability)} something unknown acts"
-            f"{_looks(found)}."
-        )
-    if found.verdict == "unknown":
-        return (
-            f"With probability {probability_words(found.unknown.probability)} something acts that none of "
-            f"{among} explains{_looks(found)}."
-        )
-    told = [f"{title_of(f.effect, names)} ({_amplitude_words(f)})" for f in found.named]
-    if len(told) == 1:
-        sure = f"with probability {probability_words(found.named[0].probability)}"
-    else:
-        sure = f"with probabilities of {listed([probability_words(f.probability) for f in found.named])}"
-    return f"Of {among}, {listed(told)} {'is' if len(told) == 1 else 'are'} named, {sure}."
-
-
-def _amplitude_words(found: Found) -> str:
-    """The amplitude; one that is within two standard errors of none says so."""
-    told = estimate_words(found.amplitude)
-    weak = abs(found.amplitude.value) < 2.0 * found.amplitude.se
-    return f"amplitude {told}, poorly known" if weak else f"amplitude {told}"
-
-
-def _looks(found: Diagnosis) -> str:
-    return f": what is left {found.unknown.looks_like}" if found.unknown.looks_like else ""
-
-
-def _closing(found: Diagnosis) -> str:
-    """How far, on the held-out run where least is closed."""
-    if not found.how_far:
-        return "No run could be held out, so how far the gap closes on data not seen is not known."
-    item = hardest(found.how_far)
-    within = averages(item.averaging_s)
-    recalibrated = (
-        f"On {held_out_words(found, item.run)}, recalibrating took the rms of {within} from "
-        f"{number(item.before)} to {number(item.recalibrated)} deg/h"
-    )
-    if found.named:
-        recalibrated += f", and what was found to {number(item.after)} deg/h"
-    return f"{recalibrated}; noise alone would leave {number(item.floor)}."
+    told = [f"{cause_words(f, names)} ({probability_words(f.probability)})" for f in found.suspected]
+    return [f"Suspected, and not sure enough to be named: {listed(told, 5)}."]
 
 
 def held_out_words(found: Diagnosis, run: str) -> str:
