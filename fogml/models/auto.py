@@ -139,11 +139,6 @@ class AutoModel(DriftModel):
         self._check_fitted()
         return self.chosen_.compact()
 
-    def weights(self) -> dict[str, NDArray[Any]]:
-        """The chosen model's arrays."""
-        self._check_fitted()
-        return self.chosen_.weights()
-
     def parameter_count(self) -> int:
         """Number of the chosen model's parameters."""
         self._check_fitted()

@@ -197,9 +197,9 @@ class DriftModel(BaseEstimator, ABC):
         """
         raise InputError(f"a model of kind '{self.kind}' has no compact form")
 
-    @abstractmethod
     def weights(self) -> dict[str, NDArray[Any]]:
         """The arrays that the fitted model consists of, by name."""
+        return self.to_saved()[1]
 
     def weight_bytes(self) -> int:
         """Bytes of what the model predicts from."""

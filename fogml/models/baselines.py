@@ -26,8 +26,9 @@ class _Saved(Strict):
 
 
 class _ConstantModel(DriftModel):
-    """Drift that is one number."""
+    """Drift that is one number, which may be learned."""
 
+    is_learned: ClassVar[bool]
     bias_: float
 
     def fit(self, runs: Run | Sequence[Run], y: None = None) -> Self:
@@ -59,8 +60,28 @@ class _ConstantModel(DriftModel):
         self._check_fitted()
         return Compact(self.kind, affine((), self.bias_))
 
+    def parameter_count(self) -> int:
+        """1 where it is learned, else 0."""
+        return int(self.is_learned)
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The number [deg/h], where it is learned."""
+        self._check_fitted()
+        return {}, {"bias": np.array([self.bias_])} if self.is_learned else {}
+
+    @classmethod
+    def from_saved(
+        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
+    ) -> _ConstantModel:
+        """The model that `to_saved` gave."""
+        strictly(_Saved, values, "model")
+        expect_arrays(arrays, {"bias": (np.float64, (1,))} if cls.is_learned else {})
+        model = cls()
+        model.bias_ = float(arrays["bias"][0]) if cls.is_learned else 0.0
+        return model
+
     def _bias(self, error: FloatArray) -> float:
-        raise NotImplementedError
+        return float(error.mean()) if self.is_learned else 0.0
 
     def _out_of_fold(self, fitted: TrainingTable, held: TrainingTable) -> FloatArray:
         return np.full(len(held), self._bias(fitted.y))
@@ -71,32 +92,7 @@ class NoCompensation(_ConstantModel):
 
     form: ClassVar[str] = "none"
     kind = "none"
-
-    def _bias(self, error: FloatArray) -> float:
-        return 0.0
-
-    def weights(self) -> dict[str, NDArray[Any]]:
-        """Nothing."""
-        return {}
-
-    def parameter_count(self) -> int:
-        """0."""
-        return 0
-
-    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-        """Nothing beside card and intervals."""
-        return {}, {}
-
-    @classmethod
-    def from_saved(
-        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
-    ) -> NoCompensation:
-        """The model that `to_saved` gave."""
-        strictly(_Saved, values, "model")
-        expect_arrays(arrays, {})
-        model = cls()
-        model.bias_ = 0.0
-        return model
+    is_learned = False
 
 
 class MeanModel(_ConstantModel):
@@ -104,30 +100,4 @@ class MeanModel(_ConstantModel):
 
     form: ClassVar[str] = "mean"
     kind = "mean"
-
-    def _bias(self, error: FloatArray) -> float:
-        return float(error.mean())
-
-    def weights(self) -> dict[str, NDArray[Any]]:
-        """The mean error [deg/h]."""
-        self._check_fitted()
-        return {"bias": np.array([self.bias_])}
-
-    def parameter_count(self) -> int:
-        """1."""
-        return 1
-
-    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-        """The mean error."""
-        return {}, self.weights()
-
-    @classmethod
-    def from_saved(
-        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
-    ) -> MeanModel:
-        """The model that `to_saved` gave."""
-        strictly(_Saved, values, "model")
-        expect_arrays(arrays, {"bias": (np.float64, (1,))})
-        model = cls()
-        model.bias_ = float(arrays["bias"][0])
-        return model
+    is_learned = True

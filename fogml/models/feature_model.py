@@ -220,11 +220,6 @@ class FeatureModel(DriftModel):
         self._check_fitted()
         return compact_regressor(self.kind, self.regressor_)
 
-    def weights(self) -> dict[str, NDArray[Any]]:
-        """The regressor's arrays."""
-        self._check_fitted()
-        return regressor_to_saved(self.regressor_)[1]
-
     def parameter_count(self) -> int:
         """Number of the regressor's fitted parameters."""
         self._check_fitted()

@@ -192,11 +192,6 @@ class JointModel(DriftModel):
         scale, linear = np.split(self.regressor_.coef_, [3])
         return Compact(self.kind, affine(linear, self.regressor_.intercept_), scale, linear_beyond=True)
 
-    def weights(self) -> dict[str, NDArray[Any]]:
-        """Coefficients and intercept."""
-        self._check_fitted()
-        return self.regressor_.to_saved()[1]
-
     def parameter_count(self) -> int:
         """Number of coefficients, the intercept included."""
         self._check_fitted()
