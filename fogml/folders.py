@@ -10,10 +10,16 @@ import sys
 import unicodedata
 from pathlib import Path
 
-from fogml.errors import printable
+from fogml.errors import InputError, printable
 
 _AT_CWD, _RENAME_EXCHANGE = -100, 2  # of Linux
 _UNSAFE = re.compile(r"[^\w.+-]+")
+
+
+def refuse_file(path: Path, option: str = "--out") -> None:
+    """Refuse a file where a folder is to be made; `option` is what names another."""
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path}: is a file, a folder was expected; choose another {option}")
 
 
 def safe_name(text: str, mark: str, longest_bytes: int) -> str:

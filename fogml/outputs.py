@@ -21,7 +21,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from fogml.errors import FogmlError, InputError, listed, printable
-from fogml.folders import exchange_whole, has_to_stay, is_folder, nearest_folder
+from fogml.folders import exchange_whole, has_to_stay, is_folder, nearest_folder, refuse_file
 from fogml.locks import NO_ROOM, FileLock, remove_left_locks, sole_writer, unwritable
 
 PARTIAL, COMMIT = ".partial-", ".commit-"
@@ -132,8 +132,7 @@ def whole_folder(path: str | Path, *, shared: bool = False) -> Iterator[Path]:
         If the disk is full, naming `path`.
     """
     path = Path(path)
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{path}: is a file, a folder was expected; choose another --out")
+    refuse_file(path)
     real = Path(os.path.realpath(path))
     home = real if real.exists() and (shared or has_to_stay(real)) else nearest_folder(real.parent)
     with ExitStack() as stack:

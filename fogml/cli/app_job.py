@@ -14,6 +14,7 @@ from fogml.cli.run_commands import AppSettings
 from fogml.cli.settings import SHIPPED, Settings, given_settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError, install_words, quoted
+from fogml.folders import refuse_file
 from fogml.locks import Held, sole_writer
 from fogml.processes import needs_posix
 
@@ -205,8 +206,7 @@ def serve(settings: AppSettings, terminal: Terminal) -> None:
     except ImportError as error:
         raise InputError(f"fogml app needs Tornado ({error}): {install_words('app')}") from None
     home = Path(settings.folder)
-    if home.exists() and not home.is_dir():
-        raise InputError(f"{home}: is a file, a folder was expected; choose another FOLDER")
+    refuse_file(home, "FOLDER")
     home.mkdir(parents=True, exist_ok=True)
     home = home.resolve()
     from fogml.app.state import App, Limits

@@ -13,6 +13,7 @@ from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.tasks import DONE, FLEET, Task, full_disk
+from fogml.folders import refuse_file
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.locks import sole_writer
 from fogml.outputs import whole_folder
@@ -56,8 +57,7 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     _check(settings, units)
     tasks = _tasks(settings, units)
     home = Path(settings.out)
-    if home.exists() and not home.is_dir():
-        raise InputError(f"{home}: is a file, a folder was expected; choose another --out")
+    refuse_file(home)
     with sole_writer(home), terminal.work("fleet", total=len(tasks)) as work:
         outcomes = _run(settings, tasks, work, terminal)
     from fogml.fleet.summary import fleet_json

@@ -13,7 +13,7 @@ from fogml.cli.runs import check_named_once, note_wrong, open_model, open_run
 from fogml.cli.terminal import UNITS_SHOWN, Terminal
 from fogml.errors import InputError, counted, in_one_line
 from fogml.fleet.tasks import FAILED, FLEET
-from fogml.folders import link_or_copy
+from fogml.folders import link_or_copy, refuse_file
 from fogml.json_files import finite_json, read_json, write_json
 from fogml.models.base import DriftModel
 from fogml.monitor.evidence import ChangePrior
@@ -30,8 +30,7 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
     """Keep new runs, judge every unit's, write and print it; whether all were used and no unit changed."""
     assert settings.model
     home = Path(settings.out)
-    if home.exists() and not home.is_dir():
-        raise InputError(f"{home}: is a file, a folder was expected; choose another --out")
+    refuse_file(home)
     records, refused = _records(settings, terminal)
     place = settings.store or str(home / "store")
     with closing(open_store(place, settings.patience)) as store, terminal.work("keeping runs"):

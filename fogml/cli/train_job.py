@@ -87,7 +87,7 @@ def noise_run(
         any_unit=settings.any_unit,
     )
     if run is not None:
-        from fogml.validation.floors import check_noise_run
+        from fogml.runs.turning import check_noise_run
 
         check_noise_run(run)
     return run

@@ -27,7 +27,7 @@ from fogml.intervals import Z50
 from fogml.numerals import short
 from fogml.runs.run import Run
 from fogml.runs.thermometers import leading_temperature
-from fogml.runs.turning import turning
+from fogml.runs.turning import check_noise_run
 from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior, fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
@@ -132,8 +132,7 @@ def prior_of(
     if noise_run is None:
         wide = NoisePrior(centre, tuple(max(f, 1.001) for f in factor))  # type: ignore[arg-type]
         return wide, "the runs themselves, what moves with temperature taken out"
-    if turning(noise_run).any():
-        raise InputError(f"{noise_run.name}: the table turns in it; a noise run is a static one")
+    check_noise_run(noise_run)
     usable, _ = usable_samples(noise_run)
     time, values = noise_run.time[usable], noise_run.gyro_deg_h[usable]
     if len(time) < settings.fewest_samples:

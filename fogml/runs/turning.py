@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fogml.arrays import BoolArray, FloatArray
-from fogml.errors import counted
+from fogml.errors import InputError, counted
 from fogml.intervals import MEDIAN_SIZE
 from fogml.numerals import short
 from fogml.runs.attitude import attitude, with_table_axis
@@ -40,6 +40,12 @@ def turning(run: Run) -> BoolArray:
         return np.zeros(len(run), dtype=bool)
     least = least_rate_deg_s(run)
     return large.each(lambda rate: np.abs(rate) > least, run.rate, kind=bool)
+
+
+def check_noise_run(noise: Run) -> None:
+    """Refuse a run that can't tell a unit's noise."""
+    if turning(noise).any():
+        raise InputError(f"{noise.name}: the table turns in it; a noise run is a static one")
 
 
 def least_rate_deg_s(run: Run, noises: float = 6.0) -> float:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from fogml.databases import engine_settings, parse_url, shown_url, told_by
 from fogml.errors import InputError, install_words
+from fogml.folders import refuse_file
 from fogml.outputs import folder_to_fill
 
 if TYPE_CHECKING:
@@ -122,8 +123,7 @@ def _journal(folder: Path) -> BaseStorage:
 
     from fogml.tuning.journal import WholeLines
 
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file, a folder was expected; choose another --out")
+    refuse_file(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / JOURNAL

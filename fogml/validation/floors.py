@@ -70,12 +70,6 @@ def floors_over(run: Run, averaging_s: float, times_s: Sequence[float]) -> list[
     return [found.floor(time_s, max(int(recorded_s / time_s), 2)) for time_s in times_s]
 
 
-def check_noise_run(noise: Run) -> None:
-    """Refuse a run that can't tell a unit's noise."""
-    if not np.all(rows_at_rest(noise)):
-        raise InputError(f"{noise.name}: the table turns in it; a noise run is a static one")
-
-
 def _model(
     run: Run, used: BoolArray, error_deg_h: FloatArray, averaging_s: float, *, static: bool = False
 ) -> FloorModel | None:

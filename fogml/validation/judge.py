@@ -18,10 +18,11 @@ from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.runs.thermometers import leading_temperature
+from fogml.runs.turning import check_noise_run
 from fogml.signals.averages import AVERAGING_S
 from fogml.signals.floor import Floor
 from fogml.signals.shared import shared_samples
-from fogml.validation.floors import check_noise_run, floor_of_run, out_of_reach
+from fogml.validation.floors import floor_of_run, out_of_reach
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics, check_turn_on_band, repeatability_of
 from fogml.validation.results import AveragedSeries, Judgement, RunJudgement
