@@ -24,7 +24,7 @@ from fogml.report.figures_judgement import (
     drift_in_time,
     rms_by_regime,
 )
-from fogml.report.figures_noise import term_deviation
+from fogml.report.figures_noise import _span, term_deviation
 from fogml.report.index_page import loop_between, loops
 from fogml.report.inspect_page import temperature_rates
 from fogml.report.page import Drawing, _Drawings
@@ -297,6 +297,12 @@ def test_table_rates_are_drawn_odd_about_rest_and_over_the_time_of_the_temperatu
     assert shown.yaxis == "y2" and shown.y == pytest.approx([0.0, 0.0, 4.0, -4.0])
     ticks = dict(zip(figure.layout.yaxis2.ticktext, figure.layout.yaxis2.tickvals, strict=True))
     assert ticks["0"] == 0.0 and ticks["1"] == pytest.approx(-ticks["−1"])
+
+
+def test_intervals_of_a_deviation_reach_a_decade_beyond_the_curve_at_most() -> None:
+    adev = np.array([1.0, 2.0])
+    assert _span(adev, np.array([[0.5, 5.0], [1.5, 7.0]])) == (0.5, 7.0)
+    assert _span(adev, np.array([[1e-4, 5.0], [1.5, 900.0]])) == pytest.approx((0.1, 20.0))
 
 
 def test_the_band_of_variance_ratios_is_what_chance_makes_about_one() -> None:

@@ -13,10 +13,10 @@ import plotly.graph_objects as go
 import pytest
 
 from fogml.numerals import number
-from fogml.report.compare_page import compare_page, ranked
+from fogml.report.compare_page import compare_page, models_table, ranked
 from fogml.report.index_page import index_page
 from fogml.report.inspect_page import inspect_page
-from fogml.report.noise_page import noise_page
+from fogml.report.noise_page import headline_tiles, noise_page
 from fogml.report.page import Drawing, _Drawings
 from fogml.report.tables import metrics_table
 from fogml.report.train_page import train_page
@@ -199,7 +199,14 @@ def test_the_comparison_is_sorted_and_names_the_choice_and_the_harm() -> None:
     models = {n: judgement(kind=n, left=left) for n, left in (("mean", 1.0), ("M2", 2.0), ("rbf", 0.01))}
     models["auto"] = replace(models["rbf"], model={**models["rbf"].model, "kind": "rbf", "chosen_by": "auto"})
     assert ranked(models)[-2:] == ["mean", "M2"]
-    text = Page(compare_page(models, {"joint": "the table did not turn"})).text
+    read = Page(compare_page(models, {"joint": "the table did not turn"}))
+    text = read.text
+    rows = models_table(models, ranked(models)).rows
+    assert {row.cells[0]: row.mark for row in rows} == {
+        "auto": "chosen", "mean": "baseline", "M2": "", "rbf": ""
+    }  # fmt: skip
+    left = [trace["name"] for trace in read.figures[-1]["data"]]
+    assert "mean" not in left and {"auto", "rbf", "M2"} <= set(left)
     assert "auto chose rbf (T, dT, T*dT)" in text
     # Parameters and bytes of each, in its row.
     assert text.count(" 41 344 ") == len(models)
@@ -242,6 +249,15 @@ def test_the_noise_page_tells_terms_and_warnings() -> None:
     assert "not read from a run with moving temperature" in text
     assert "no more than 0.500" in text
     assert "overlapping" in text
+
+
+def test_a_term_that_is_not_told_from_zero_is_no_headline() -> None:
+    values = noise_values()
+    white = {**values["terms"]["N"], "ci": [0.0, 0.02]}
+    bare = {**values, "terms": {"N": white}, "minimum": {}}
+    assert "angle random walk" in [tile.name.lower() for tile in headline_tiles(values)]
+    assert not [tile for tile in headline_tiles(bare) if tile.unit == "deg/√h"]
+    assert "The data support no noise term." in Page(noise_page(bare)).text
 
 
 def test_a_deviation_of_nothing_is_no_empty_figure() -> None:

@@ -23,6 +23,8 @@ from fogml.report.style import log_axis, rounded_up, time_unit
 from fogml.report.tables import Table, coefficients_table
 from fogml.twin.pictures import card_values
 from fogml.twin.registry import effect
+from tests.report.pages import Page
+from tests.report.procedure_pages import benchmark
 
 
 @pytest.mark.parametrize(
@@ -174,6 +176,8 @@ def test_a_curve_of_no_method_is_not_drawn() -> None:
     assert open_set_plot({"diagnosis": flat}, {}) is None
     drawing = open_set_plot({"diagnosis": flat, "bic": bent}, {"bic": 0.85})
     assert drawing is not None and [trace.name for trace in drawing.figure.data] == ["chance", "bic (0.850)"]
+    both = open_set_plot({"diagnosis": bent, "bic": bent}, {})
+    assert both is not None and both.figure.data[1].line.width > both.figure.data[2].line.width
     assert spanned("0.8-0.9") == "0.8–0.9" and spanned("same-twin") == "same-twin"
 
 
@@ -187,8 +191,9 @@ def test_a_long_time_is_told_to_half_a_unit(days):
 
 def test_a_share_just_short_of_what_is_wanted_is_seen_to_be_short() -> None:
     row = {"format": "percent", "low": None, "high": None, "wanted": {"low": 0.87, "high": 0.93}}
-    assert [figure_text({**row, "value": value}) for value in (0.869996, 0.9, None)] == [
+    assert [figure_text({**row, "value": value}) for value in (0.869996, 0.87, 0.9, None)] == [
         "86.9996 %",
+        "87.0 %",
         "90.0 %",
         "–",
     ]
@@ -202,3 +207,9 @@ def test_without_limits_none_are_counted() -> None:
 def test_a_card_s_page_writes_units_as_other_pages_do() -> None:
     table = quantities_table(card_values(effect("thermal_hysteresis")))
     assert [row.cells[2] for row in table.rows] == ["deg/h", "°C"]
+
+
+def test_ratios_of_entries_are_drawn_by_data_and_of_all_cases() -> None:
+    read = Page(benchmark("FOG-1"))
+    names = [[trace["name"] for trace in figure["data"]] for figure in read.figures]
+    assert ["thermal cycle, MEMS", "synthetic, second reality", "all, with 95 % interval"] in names
