@@ -186,21 +186,10 @@ def of_usual_averages(
     table: TrainingTable,
     predicted: Callable[[FloatArray], FloatArray],
 ) -> Intervals:
-    """Half-widths told by long averages, for the usual ones of `interval_table`.
+    """Half-widths told by long averages of atoms, for the usual ones of `interval_table`.
 
-    What shorter averages leave beyond the long ones is noise that has averaged out in these: its variance is
-    added, both as normal errors.
-
-    Parameters
-    ----------
-    found
-        Of averages of `table`.
-    rows
-        What the table was made of.
-    table
-        Averages of atoms.
-    predicted
-        The model's prediction [deg/h] from atoms.
+    What shorter averages leave of a prediction [deg/h] from atoms beyond the long ones is noise that has
+    averaged out in these: its variance is added, both as normal errors.
     """
     usual = interval_table(rows)
     if not usual.averaging_s < found.averaging_s:
@@ -214,18 +203,10 @@ def of_usual_averages(
 def widened_to_use(
     found: Intervals, rows: Sequence[RunRows], drift_at: Callable[[FloatArray], FloatArray]
 ) -> Intervals:
-    """Half-widths no narrower than what the model leaves on its own rows, used sample by sample.
+    """Half-widths of averages, no narrower than what the model leaves on its training rows.
 
-    What bends makes more of a feature's noise at samples than at the averages of `interval_table`.
-
-    Parameters
-    ----------
-    found
-        Of averages.
-    rows
-        Training rows.
-    drift_at
-        The model's drift [deg/h] from atoms.
+    There its drift [deg/h] is told from atoms sample by sample: what bends makes more of a feature's noise at
+    samples than at the averages of `interval_table`.
     """
     used = averaged_table(rows, lambda atoms: drift_at(atoms)[:, None], found.averaging_s)
     own = intervals_from_residuals(used.y - used.X[:, 0], found.averaging_s, found.folds)

@@ -29,14 +29,7 @@ def _turns(y: FloatArray) -> BoolArray:
 
 
 def check_turns(names: Sequence[str], rows: Sequence[RunRows]) -> None:
-    """Refuse training rows from which no scale factor can be told.
-
-    Parameters
-    ----------
-    names
-        Names of the runs.
-    rows
-        Their rows, y the reference rate [deg/h].
+    """Refuse runs by whose rows, y the reference rate [deg/h], no scale factor can be told.
 
     Raises
     ------

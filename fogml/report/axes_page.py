@@ -158,14 +158,9 @@ _SHOWN: dict[str, tuple[str, str, Callable[[Mapping[str, Any]], tuple[str, ...]]
 
 
 def units_page(values: Mapping[str, Any], words: Mapping[str, str]) -> str:
-    """The self-contained HTML page of a ``units.json``.
+    """The self-contained HTML page of a ``units.json`` (schema ``fogml.gap_units/1``).
 
-    Parameters
-    ----------
-    values
-        Schema ``fogml.gap_units/1``.
-    words
-        Verdict and named causes of each unit.
+    `words` are verdict and named causes of each unit.
     """
     units = list(values["units"])
     return render(

@@ -228,13 +228,7 @@ STEP = 0.05
 
 
 def counterfactual_page(found: Diagnosis) -> str:
-    """The self-contained HTML page of a diagnosis that kept its courses.
-
-    Parameters
-    ----------
-    found
-        As :func:`fogml.gap.diagnose` gives it with ``courses=True``.
-    """
+    """The self-contained HTML page of a diagnosis that kept its courses (``courses=True``)."""
     runs = sorted(found.counterfactuals, key=lambda run: run.role == "fit")
     sliders = _sliders(found, runs)
     data = {"runs": [_packed(run) for run in runs]}

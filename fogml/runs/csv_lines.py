@@ -261,19 +261,9 @@ def note_of_end(source: CsvSource) -> list[Finding]:
 def cut_line(source: CsvSource, separator: str | None, decimal: str) -> str | None:
     """The last line where it is evidently cut within its last number, else None.
 
-    Parameters
-    ----------
-    source
-        The file.
-    separator
-        Between fields; None for blanks.
-    decimal
-        Decimal mark.
-
-    Notes
-    -----
     It has no end, and its last number has fewer decimals (or, for whole numbers, fewer digits)
     than that of every one of at least 20 lines before it: what wrote these was stopped there.
+    No separator stands for blanks.
     """
     tail = source.tail(_TAIL_BYTES)
     if tail.endswith((b"\r", b"\n")):

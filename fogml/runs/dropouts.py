@@ -264,11 +264,6 @@ class ThermometerStream:
 
     A recording's first readings are told by those around them, which are not known on board: there a first
     reading that the next one contradicts is replaced by it. Noise beyond the rule's jump is not made up for.
-
-    Parameters
-    ----------
-    rule
-        What is none.
     """
 
     def __init__(self, rule: DropoutRule = RULE) -> None:

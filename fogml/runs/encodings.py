@@ -14,12 +14,7 @@ _NO_SIGN = re.compile(rb"[\x81\x8d\x8f\x90\x9d]")
 def encoding_of(head: bytes, cut: bool) -> str:
     """The likeliest encoding of a text: UTF-8, Windows-1251, GB 18030 or Shift-JIS, else Latin-1.
 
-    Parameters
-    ----------
-    head
-        The first bytes of the text.
-    cut
-        Whether it goes on.
+    Told from its first bytes, `cut` where it goes on.
     """
     for end in range(4 if cut else 1):
         # The last character of a cut head may be incomplete.

@@ -43,15 +43,10 @@ class ValueHold:
 
 
 def hold_of(values: FloatArray) -> ValueHold:
-    """How long each value of an evenly sampled series is held.
+    """How long each value of an evenly sampled stretch without gaps, shape (n,), is held.
 
     A coarse converter repeats values by chance, for a random number of samples; a hold lasts the same
     number each time, or two neighbouring numbers in turn where it is no whole number of samples.
-
-    Parameters
-    ----------
-    values
-        A stretch without gaps, shape (n,).
     """
     every = ValueHold(1.0, np.arange(len(values)))
     changes = np.flatnonzero(values[1:] != values[:-1]) + 1

@@ -31,14 +31,7 @@ HOLDING = ("workbook", "packed")
 class HeldText:
     """That text as a file of the same name, in a folder that is there as long as this object is.
 
-    Parameters
-    ----------
-    path
-        The file that holds it.
-    kind
-        Its format, one of `HOLDING`.
-    limits
-        What unpacking may take.
+    `path` is the file that holds it, of a format of `HOLDING`.
 
     Raises
     ------

@@ -189,17 +189,7 @@ class Beside:
     """A column of another group, read forward as the blocks of the run want it.
 
     Held of it are the values about the block's times; all of it where its own clock or the run's goes back.
-
-    Parameters
-    ----------
-    cell
-        Its header cell.
-    clock
-        Header cell and array of its times.
-    array
-        Where it is stored.
-    step
-        Values read at once.
+    `step` values are read at once.
     """
 
     def __init__(

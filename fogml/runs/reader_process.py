@@ -205,13 +205,7 @@ def _array(index: int, told: Mapping[str, Any]) -> StoredArray:
 
 
 class ReaderProcess:
-    """The other process: it answers one request after another until one ends it.
-
-    Parameters
-    ----------
-    script
-        What it runs.
-    """
+    """The other process: it answers one request after another until one ends it."""
 
     def __init__(self, script: Path = CHILD) -> None:
         # Plug-ins of HDF5 are other people's code; arithmetic in several threads is of no use here.

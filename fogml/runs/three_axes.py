@@ -20,15 +20,7 @@ OF_AN_AXIS = ("gyro", "rate")
 
 
 class SeveralAxes(InputError):
-    """A file holds several gyros where one is needed.
-
-    Parameters
-    ----------
-    file
-        Base name.
-    axes
-        The axes it holds.
-    """
+    """A file, by its base name, holds the gyros of several axes where one is needed."""
 
     def __init__(self, file: str, axes: tuple[str, ...]) -> None:
         self.axes = axes

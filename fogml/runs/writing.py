@@ -217,13 +217,6 @@ def check_side_file(path: str | Path, facts: Facts) -> Path | None:
     another note, is replaced with the run that it belongs to. One that states another fact, or one that this
     run lacks, is an error, and so is one that would state more of another file of the stem.
 
-    Parameters
-    ----------
-    path
-        The run to be written.
-    facts
-        What its side file has to state.
-
     Raises
     ------
     InputError

@@ -87,17 +87,7 @@ class _Told(NamedTuple):
 
 
 class SpectrumModel:
-    """A family of densities at the rows of a spectrum.
-
-    Parameters
-    ----------
-    spectrum
-        The data.
-    terms, output_filter
-        The family.
-    used
-        Rows that count; all if None.
-    """
+    """A family of densities, of terms behind a filter, at the rows of a spectrum that count; all if None."""
 
     def __init__(
         self,
