@@ -105,12 +105,7 @@ def within(path: str | Path, roots: Iterable[Path]) -> bool:
 def seal(folder: Path, more: Iterable[Path] = ()) -> str:
     """Shut this process in, for good; returns the locks in use: ``landlock and audit`` or ``audit``.
 
-    Parameters
-    ----------
-    folder
-        Where it may read and write.
-    more
-        Further folders of code that it may read.
+    It may read and write in `folder`, and read `more` folders of code.
     """
     roots = tuple({*own_roots(), *(Path(os.path.realpath(path)) for path in more)})
     writable = (Path(os.path.realpath(folder)), Path("/dev/null"))

@@ -50,12 +50,7 @@ _CONFIG = "YAML file with any of these settings; flags override it."
 class SettingsCommand(click.Command):
     """A command that takes its settings from flags and a file, and does their job.
 
-    Parameters
-    ----------
-    name
-        Of the command.
-    settings
-        Their class; its docstring is the help.
+    The docstring of their class is its help.
     """
 
     context_class = HelpContext

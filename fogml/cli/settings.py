@@ -114,12 +114,7 @@ class Settings(Strict):
     def refuse_idle(self, names: Sequence[str], why: str) -> None:
         """Refuse settings that would change nothing as the others are.
 
-        Parameters
-        ----------
-        names
-            Settings that may only be as they usually are.
-        why
-            What they belong to, and what to do.
+        `why` says what they belong to, and what to do.
 
         Raises
         ------
@@ -151,15 +146,7 @@ class Settings(Strict):
         return self.model_dump(mode="json")
 
     def yaml(self, command: str, name: str | None = None) -> str:
-        """The settings as the text of a configuration file.
-
-        Parameters
-        ----------
-        command
-            What takes it.
-        name
-            Name of the file; that of `config_file` if None.
-        """
+        """The settings as the text of a configuration file, called as `config_file` has it unless named."""
         option = "" if self.config_argument else "--config "
         again = f"fogml {command} {option}{name or config_file(command)}"
         head = f"# fogml {__version__}: run it again with  {again}\n"

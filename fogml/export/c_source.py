@@ -258,15 +258,7 @@ def project_files(name: str) -> dict[str, str]:
 
 
 def rust_bindings(source: CSource, state_bytes: int) -> str:
-    """A module of Rust that calls generated C through ``extern "C"``.
-
-    Parameters
-    ----------
-    source
-        The C.
-    state_bytes
-        Bytes of a state.
-    """
+    """A module of Rust that calls generated C, of a state of so many bytes, through ``extern "C"``."""
     numbers = source.numbers
     return (
         templates()

@@ -23,14 +23,7 @@ MOST = 2.0**26
 class Symbol:
     """A value that is not known yet: a name in C.
 
-    Parameters
-    ----------
-    writer
-        Where lines go that make further values of it.
-    name
-        The name.
-    stepwise
-        Whether it depends on the time step alone.
+    Lines that make further values of it go to `writer`; `stepwise` ones depend on the time step alone.
     """
 
     __array_ufunc__ = None

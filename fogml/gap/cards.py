@@ -91,16 +91,7 @@ def _spreads(declared: Effect) -> bool:
 def card_of(id: str, field: Field, beside: LinearGaussian, told: Mapping[str, Any]) -> Card:
     """The catalogue's form of an effect that fits best beside everything else.
 
-    Parameters
-    ----------
-    id
-        Of the effect.
-    field
-        Runs, and what is whitened.
-    beside
-        The data beside constants and all other causes.
-    told
-        Shape that the cause's family tells, such as a period.
+    `beside` is the data beside constants and all other causes, `told` a shape that its family tells.
 
     Notes
     -----

@@ -88,12 +88,7 @@ def apart(columns: Sequence[FloatArray], fitted: int) -> list[FloatArray]:
 class Field:
     """Whitened data, fixed block and columns at one noise, each block scaled to a whitened length of 1.
 
-    Parameters
-    ----------
-    setting, columns, noise
-        Runs and constants; families' blocks; the noise.
-    only
-        Nodes that are held; all if None.
+    Of `only` some nodes, if that is not None.
     """
 
     def __init__(

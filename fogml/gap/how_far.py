@@ -134,18 +134,8 @@ class Foretold:
 class HeldOut:
     """One held-out run: what is common to all that is asked of it.
 
-    Parameters
-    ----------
-    found
-        The inference.
-    run
-        Number of the run in the scene.
-    recalibrated
-        Constants alone.
-    members
-        Causes of the likeliest set: what they make is no noise.
-    seed
-        Of the draws behind intervals.
+    `members` are causes of the likeliest set: what they make is no noise. `seed` is of draws behind
+    intervals.
     """
 
     def __init__(

@@ -67,13 +67,7 @@ class _Held:
 
 
 class Search:
-    """Finds explanations.
-
-    Parameters
-    ----------
-    held
-        Data and columns at the noise that fits best.
-    """
+    """Finds explanations of data, with columns at the noise that fits best."""
 
     def __init__(self, held: Field) -> None:
         self.field = held

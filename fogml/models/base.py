@@ -178,12 +178,7 @@ class DriftModel(BaseEstimator, ABC):
     def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
         """As `evaluate`, from the values of the features' atoms, unchecked.
 
-        Parameters
-        ----------
-        run
-            A run, or a block of one.
-        atoms
-            Values of the atoms of ``features_`` at the n samples.
+        The run may be a block of one; the atoms are those of ``features_`` at its n samples.
         """
         raise NotImplementedError(f"{type(self).__name__} does not evaluate atoms")
 

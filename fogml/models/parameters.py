@@ -62,17 +62,7 @@ class Device:
 
 
 def check_parameters(kind: type, given: Mapping[str, Any], name: str | None = None) -> None:
-    """Check parameters of an estimator.
-
-    Parameters
-    ----------
-    kind
-        Its class.
-    given
-        The parameters that are stated.
-    name
-        What to call it in messages; the class's name if None.
-    """
+    """Check parameters that are stated for an estimator of a class, called by `name` if that is given."""
     name = name or kind.__name__
     stated = inspect.signature(kind).parameters
     known = list(stated)

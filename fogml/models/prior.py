@@ -156,12 +156,7 @@ def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float
     from so many units predict (A. Gelman et al., Bayesian Data Analysis, 3.6).
     0 if the rows tell nothing, as then an odd unit would look the same.
 
-    Parameters
-    ----------
-    information, image
-        What the unit's rows tell of its constants, as in `posterior`.
-    prior
-        What the fleet tells.
+    `information` and `image` are what the unit's rows tell of its constants, as in `posterior`.
     """
     precise, squares = _heard(information, image, prior)
     if not len(precise):
@@ -187,12 +182,7 @@ def rarity(information: FloatArray, image: FloatArray, prior: Prior) -> float:
     By chi-square of the directions of which the rows tell something, the fleet's mean and covariance taken as
     they are: for the units that these are estimated from.
 
-    Parameters
-    ----------
-    information, image
-        What the unit's rows tell of its constants, as in `posterior`.
-    prior
-        What the fleet tells.
+    `information` and `image` are as in `agreement`.
     """
     precise, squares = _heard(information, image, prior)
     return float(chi2_sf(squares.sum(), len(precise))) if len(precise) else 1.0

@@ -89,15 +89,7 @@ def reader_of(name: str) -> Reader:
 
 
 def reader_of_content(head: bytes, suffix: str) -> Reader | None:
-    """The reader of a file by its first bytes; by its suffix where several formats begin alike.
-
-    Parameters
-    ----------
-    head
-        The first 64 bytes or more.
-    suffix
-        Of the file's name, with its point.
-    """
+    """The reader of a file by its first 64 bytes; by its suffix where several formats begin alike."""
     suffix = suffix.lower()
     named = [reader for reader in READERS if suffix in reader.suffixes]
     if head.startswith(b"PK\x03\x04"):

@@ -55,12 +55,7 @@ class Spool:
 class Rows:
     """A table's rows, added as bytes in order and read back by column.
 
-    Parameters
-    ----------
-    spool
-        Where they are kept.
-    layout
-        Of a row; fields by name, or one plain type.
+    Its `layout` has fields by name, or is one plain type.
     """
 
     def __init__(self, spool: Spool, layout: Any) -> None:

@@ -104,12 +104,7 @@ class CsvDialect:
 def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
     """Tell the dialect from a file's first lines.
 
-    Parameters
-    ----------
-    path
-        The file.
-    seconds
-        Places of columns that are in seconds whatever the header says.
+    `seconds` are places of columns that are in seconds whatever the header says.
 
     Raises
     ------

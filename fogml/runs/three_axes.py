@@ -40,10 +40,7 @@ def axes_of(names: Collection[str]) -> tuple[str, ...]:
 class OneAxis:
     """Takes one axis out of a file, its table first, then the runs made of that.
 
-    Parameters
-    ----------
-    axis
-        The axis wanted; None for whatever the file holds.
+    Of none it takes whatever the file holds.
     """
 
     axis: str | None

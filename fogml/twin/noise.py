@@ -92,12 +92,7 @@ def _checked(seed: int) -> int:
 class Streams(dict[str, np.random.Generator]):
     """The generators of a kind of source by their names, each made when it is first asked for.
 
-    Parameters
-    ----------
-    seed
-        Of all of them.
-    kind
-        What they are for, first word of their names in `stream`.
+    `kind`, what they are for, is the first word of their names in `stream`.
 
     Raises
     ------

@@ -214,16 +214,7 @@ class Frame:
 class Level:
     """Training rows averaged to some coarseness, standardised.
 
-    Parameters
-    ----------
-    rows
-        Averaged rows.
-    frame
-        Standardisation of inputs and target.
-    seen
-        Indices of the network's inputs.
-    device, dtype
-        Where torch works the objective out, and in what.
+    `seen` are indices of the network's inputs; torch works on `device` in `dtype`.
     """
 
     def __init__(self, rows: AveragedRows, frame: Frame, seen: IndexArray, device: str, dtype: str) -> None:

@@ -102,16 +102,7 @@ class Tried:
 class Search:
     """The search on averaged rows: all that is tried on coarse ones, the best refined on fine ones.
 
-    Parameters
-    ----------
-    fine, coarse
-        Averaged rows; the same where there are few.
-    frame
-        Standardisation of inputs and target.
-    seen
-        Indices of the network's inputs.
-    settings
-        What may be done.
+    Where rows are few, fine and coarse ones are the same. `seen` are indices of the network's inputs.
     """
 
     def __init__(

@@ -148,16 +148,7 @@ class Descent:
     Where it goes on, it does so as if it had never been left: what L-BFGS knows of the curvature is
     won back from the values that it has asked for, which are kept until its end.
 
-    Parameters
-    ----------
-    function
-        The objective.
-    variables
-        What moves.
-    learn
-        Whether the ridge is learned, rather than kept.
-    watch
-        Sees every step.
+    The ridge is kept unless `learn`; `watch` sees every step.
 
     Attributes
     ----------
