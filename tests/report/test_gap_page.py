@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fogml.gap.result import Diagnosis, HowFar
-from fogml.gap.result_parts import Where, beyond_noise
+from fogml.gap.result_parts import GapSegment, Where, beyond_noise
 from fogml.gap.sentences import headline
 from fogml.gap.settings import STANDARD
 from fogml.numerals import MISSING, probability_words, unit_words, with_error
 from fogml.report.gap_page import MOST_RUNS_DRAWN, gap_page
-from fogml.report.gap_tables import causes_table, constants_table
+from fogml.report.gap_tables import causes_table, constants_table, segments_table
 from fogml.twin.registry import effect, effects
 from tests.report.diagnoses import FLOOR, diagnosis, every_diagnosis, hysteresis, series
 from tests.report.pages import Page
@@ -176,6 +176,15 @@ def test_segments_are_drawn_where_they_are() -> None:
     ]
     assert len(drawn) == 1
     assert drawn[0]["x"][:2] == [1.5, 2.5]
+
+
+def test_of_many_segments_those_of_most_excess_are_listed_in_their_order() -> None:
+    found = diagnosis()
+    many = tuple(GapSegment("a.csv", 1000.0 * k, 1000.0 * k + 500.0, 0.01 * (1 + k % 7)) for k in range(14))
+    table = segments_table(replace(found, where=replace(found.where, segments=many)))
+    assert table is not None and len(table.rows) == 12 and "2 smaller ones" in table.caption
+    kept = [float(row.cells[1]) for row in table.rows]
+    assert kept == sorted(kept) and not {0.0, 7000.0} & set(kept)
 
 
 def test_a_gap_in_time_is_drawn_as_recorded_less_replayed() -> None:

@@ -274,7 +274,7 @@ def test_without_overlap_the_noise_page_says_so() -> None:
 
 def test_the_inspect_page_tells_gaps_findings_and_columns() -> None:
     text = Page(inspect_page(recorded_run())).text
-    assert "20 000 samples" in text and "10.0 min" in text
+    assert "20 000 samples" in text and "Lasts 10001 9999 10.0 min" in text
     assert "outliers : 12 outliers over 8 robust sigma" in text.replace("outliers 12", "outliers : 12")
     assert "9.6481 deg/h" in text and "inner face of the fibre coil" in text
 
@@ -283,6 +283,7 @@ def test_a_run_without_temperature_can_be_inspected() -> None:
     run = Run.from_columns("static.csv", time=np.arange(500.0), gyro=np.sin(np.arange(500.0)))
     text = Page(inspect_page(run)).text
     assert "no temperature recorded; at rest 100 %" in text and "soak" not in text
+    assert "First row after the gap" not in text
 
 
 def test_long_runs_are_drawn_with_few_points() -> None:
