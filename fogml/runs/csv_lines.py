@@ -27,17 +27,16 @@ _CHUNK_ROWS = 1 << 16
 
 
 def line_of_row(dialect: CsvDialect, row: int) -> int:
-    """Line of a data row, both counted from 1 and 0; blank lines and quoted line ends count as they do."""
-    seen, quoted, line = -1, False, dialect.skipped_lines
-    # Latin-1 decodes any bytes, and keeps line ends and quotation marks as they are.
+    """Line of a data row, both counted from 1 and 0, of a file in which no field holds a line's end."""
+    seen, line = -1, dialect.skipped_lines
+    # Latin-1 decodes any bytes, and keeps line ends as they are.
     with io.TextIOWrapper(dialect.source.open(), encoding="latin-1", newline="") as file:
         for line, text in enumerate(file, start=1):
             if line <= dialect.skipped_lines:
                 continue
-            seen += not quoted and text not in ("\n", "\r\n", "\r")
+            seen += text not in ("\n", "\r\n", "\r")
             if seen == row:
                 break
-            quoted ^= text.count('"') % 2 == 1
     return line
 
 
