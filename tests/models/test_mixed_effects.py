@@ -7,10 +7,11 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from fogml.features.features import Features
+from fogml.features.parse import parse_features
 from fogml.models.box import moves_both_ways
 from fogml.models.combination import LeftOut
 from fogml.models.folds import dealt_blocks
-from fogml.models.mixed_effects import fit_mixed_effects
+from fogml.models.mixed_effects import basis_of, fit_mixed_effects
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
 from fogml.models.size_priors import SizePriors
@@ -216,3 +217,11 @@ def test_one_way_only_is_not_verifiable_and_as_wide_as_the_drift() -> None:
         model = make_model(name).fit(up)
         assert model.intervals_.half_width(0.9) >= 1.6 * up.gyro.std()
     assert any("not verifiable" in note for note in model.card_.notes)
+
+
+def test_a_column_that_stands_still_but_for_rounding_holds_nothing() -> None:
+    T = np.full(1000, 70.1)
+    columns = np.column_stack([T, T**3])
+    basis = basis_of(columns, parse_features("T, T^3").terms, SizePriors())
+    assert np.abs(columns - basis.shift).max() > 0.0  # what is rounded
+    assert not basis.mix.any()
