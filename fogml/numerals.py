@@ -166,6 +166,20 @@ def stated(value: float) -> str:
     return _typeset(f"{value:.10g}")
 
 
+def digits_between(least: float | None, greatest: float | None, digits: int = 3) -> int:
+    """Significant digits that show two numbers, and so many of what they differ by.
+
+    Examples
+    --------
+    >>> digits_between(-2.0, 3.0), digits_between(1_790_000_000.0, 1_790_086_400.0)
+    (3, 8)
+    """
+    if least is None or greatest is None or not 0.0 < greatest - least < math.inf:
+        return digits
+    most, apart = (math.floor(math.log10(x)) for x in (max(-least, greatest), greatest - least))
+    return min(digits + max(most - apart, 0), 16)
+
+
 def against(value: float | None, *limits: float | None) -> str:
     """A number that stands beside limits: with more digits than `number` where it would seem to lie on one.
 

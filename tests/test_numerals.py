@@ -4,12 +4,14 @@ import math
 import re
 from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fogml.numerals import (
     against,
     ascii_number,
+    digits_between,
     in_two,
     number,
     number_text,
@@ -52,6 +54,15 @@ def test_a_number_against_a_limit_reads_as_on_its_side(limit, apart, side):
     told = read(against(value, limit))
     assert (told > limit, told < limit) == (value > limit, value < limit)
     assert abs(told - value) <= 0.006 * value
+
+
+@given(st.floats(-1e12, 1e12), st.floats(1e-3, 1e12))
+def test_two_ends_are_told_to_three_digits_of_what_is_between(least, apart):
+    greatest = least + apart
+    digits = digits_between(least, greatest)
+    told = [float(f"{end:.{digits - 1}e}") for end in (least, greatest)]
+    assert told[1] - told[0] == pytest.approx(apart, rel=0.02, abs=1e-15 * abs(least))
+    assert digits <= 4 + max(math.log10(max(abs(least), abs(greatest)) / apart), 0.0)
 
 
 def test_a_value_without_a_finite_error_stands_alone():

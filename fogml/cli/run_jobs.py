@@ -20,7 +20,7 @@ from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
 from fogml.validation.floors import floors_over, settling_warning
-from fogml.validation.inspection import inspection_json
+from fogml.validation.inspection import STATISTICS, column_statistics, inspection_json
 from fogml.validation.limits import hold_strict
 
 _FIRST_ROWS = 5
@@ -144,12 +144,9 @@ def _print_run(run: dict[str, Any], terminal: Terminal) -> None:
     first = [finding for finding in run["findings"] if finding["code"] in FIRST_OF_ALL]
     for finding in first:
         terminal.say(f"{run['run']}: {finding['code'].replace('_', ' ')}: {finding['message']}")
-    rows = [
-        [column["name"], column["unit"] or "–", *(number(column[key]) for key in _STATISTICS)]
-        for column in run["columns"]
-    ]
+    rows = [[column["name"], column["unit"] or "–", *column_statistics(column)] for column in run["columns"]]
     title = f"{run['run']}: {run['rows']} rows, {duration(run['span_s'])}, one in {duration(run['sample_s'])}"
-    terminal.table(title, ["column", "unit", *(key.replace("_", " ") for key in _STATISTICS)], rows)
+    terminal.table(title, ["column", "unit", *(key.replace("_", " ") for key in STATISTICS)], rows)
     if run["earth_rate_deg_h"] is not None:
         terminal.say(f"Earth rate along the input axis: {number(run['earth_rate_deg_h'])} deg/h")
     else:
@@ -174,9 +171,6 @@ def _print_run(run: dict[str, Any], terminal: Terminal) -> None:
     terminal.say("regimes: " + ", ".join(spent))
     for finding in run["findings"][len(first) :]:
         terminal.say(f"{finding['code'].replace('_', ' ')}: {finding['message']}")
-
-
-_STATISTICS = ("least", "greatest", "mean", "standard_deviation")
 
 
 def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:

@@ -89,7 +89,10 @@ def export_axes(
     reports, codes, sensors = {}, [], []
     for (axis, model), runs in zip(named.items(), runs_of_each([*named.values()], train), strict=True):
         with scratch_folder() as alone:
-            reports[axis] = export_model(model, alone, settings, runs)
+            try:
+                reports[axis] = export_model(model, alone, settings, runs)
+            except InputError as problem:
+                raise InputError(f"axis {axis}: {problem}") from None
             (folder / f"{axis}-{DOCUMENTATION_FILE}").write_bytes((alone / DOCUMENTATION_FILE).read_bytes())
             inputs = Plan.of(model, settings.sample_s).sensors
             codes.append(_code_of(axis, alone, inputs))

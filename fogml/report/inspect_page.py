@@ -19,7 +19,7 @@ from fogml.runs.run import Run
 from fogml.signals import large
 from fogml.signals.averages import block_averages
 from fogml.signals.drawn import drawn
-from fogml.validation.inspection import inspection_json
+from fogml.validation.inspection import column_statistics, inspection_json
 
 _REGIMES_LISTED = 40
 _GAPS_LISTED = 12
@@ -124,7 +124,7 @@ def _columns(told: Mapping[str, Any]) -> Table:
         (
             column["name"],
             column["unit"] or MISSING,
-            *(number(column[key], 4) for key in ("least", "greatest", "mean", "standard_deviation")),
+            *column_statistics(column, 4),
             column["meaning"],
         )
         for column in told["columns"]

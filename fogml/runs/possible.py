@@ -212,6 +212,7 @@ class Rows(NamedTuple):
         if is_whole:
             needed = name in ("time", "gyro")
             cure = "correct them" if needed else "leave the column out where it was not recorded"
+            cure += ", or take another axis alone (--axis)" if name in self.called else ""
         no_other = ", and no other" if is_whole else ""
         return (
             f"{self.file}, column '{self.called.get(name, name)}', {self.row_name(row)}: the value is "

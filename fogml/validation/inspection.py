@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.json_files import finite_json
+from fogml.numerals import digits_between, number
 from fogml.runs.columns import column_spec
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
@@ -21,6 +22,15 @@ RATE_WINDOW_S = 60.0
 """Temperature rates are slopes between averages over this time [s]."""
 LONGEST_LIST = 1000
 """Gaps and regimes are listed up to this number; their count is always whole."""
+STATISTICS = ("least", "greatest", "mean", "standard_deviation")
+"""What is told of each column."""
+
+
+def column_statistics(column: Mapping[str, Any], digits: int = 3) -> list[str]:
+    """What is told of a column, `STATISTICS`, with digits that tell its ends apart."""
+    more = digits_between(column["least"], column["greatest"], digits)
+    *of_size, deviation = (column[key] for key in STATISTICS)
+    return [*(number(value, more) for value in of_size), number(deviation, digits)]
 
 
 def inspection_json(runs: Sequence[Run]) -> dict[str, Any]:

@@ -168,6 +168,22 @@ def test_a_fleet_takes_the_axis_that_its_manifest_names(home, tmp_path):
     assert [run["axis"] for run in (*report["train"], *report["test"])] == ["z", "z"]
 
 
+def test_an_axis_without_a_value_is_told_with_the_way_to_the_others(home, invoke, invoke_json, tmp_path):
+    """A clock that counts from 1970, beside it: the table's ends are told apart."""
+    rows = [line.split(",") for line in (home / "a.csv").read_text().splitlines()]
+    for row in rows[1:]:
+        row[0], row[2] = f"{1.79e9 + float(row[0]):.1f}", ""
+    run = tmp_path / "epoch.csv"
+    run.write_text("\n".join(map(",".join, rows)) + "\n")
+    said = invoke("inspect", run, status=2).stderr
+    assert "'gyro_y'" in said and "take another axis alone (--axis)" in said
+    shown = next(line for line in invoke("inspect", run, "--axis", "z").stdout.splitlines() if "time" in line)
+    assert shown.split()[2] != shown.split()[3]
+    alone = invoke_json("noise", run, "--axis", "z")
+    whole = invoke_json("noise", home / "a.csv", "--axis", "z")
+    assert alone["adev"] == pytest.approx(whole["adev"], rel=1e-9)
+
+
 def test_nothing_is_said_to_be_written_where_an_axis_fails(home, tmp_path):
     run = tmp_path / "c.csv"
     lines = (home / "a.csv").read_text().splitlines()
