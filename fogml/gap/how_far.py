@@ -19,11 +19,11 @@ from fogml.gap.result_parts import HowFar
 from fogml.gap.where import averages
 from fogml.intervals import TAILS, Z90
 from fogml.numerals import listed, short
+from fogml.signals.distributions import root_of
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect
 from fogml.twin.twin import EffectSetting
-from fogml.twin.uncertainty import root_of
 
 
 @dataclass(frozen=True, eq=False)

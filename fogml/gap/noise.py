@@ -250,10 +250,14 @@ def white_noise(rows: Rows, least: float, made: Sequence[FloatArray] = ()) -> tu
     [deg/h].
     """
     second = np.diff(rows.gap, 2)
-    columns = np.diff(np.concatenate([rows.constants, *made], axis=1), 2, axis=0)
-    columns = columns / np.maximum(np.abs(columns).max(axis=0), np.finfo(float).tiny)
-    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    basis = basis[:, sizes > np.finfo(float).eps * len(columns) * sizes.max(initial=0.0)]
+    values = np.concatenate([rows.constants, *made], axis=1)
+    columns = np.diff(values, 2, axis=0)
+    # Differences are rounded as their values are, which may be far larger.
+    largest = np.abs(columns).max(axis=0)
+    rounding = len(columns) * np.finfo(float).eps * np.abs(values).max(axis=0)
+    moves = largest > rounding
+    basis, sizes, _ = np.linalg.svd(columns[:, moves] / largest[moves], full_matrices=False)
+    basis = basis[:, sizes > np.max(rounding[moves] / largest[moves], initial=0.0) * sizes.max(initial=0.0)]
     left = second - basis @ (basis.T @ second)
     # With D the second differences, the diagonal of (I - U U') D D' (I - U U').
     through = np.diff(np.pad(basis, ((2, 2), (0, 0))), 4, axis=0)

@@ -33,9 +33,11 @@ def relays(x: FloatArray, centres: FloatArray, half_width: float, first: int = 0
     """State of relays within their loops, -1, 0 outside, or 1, shape (n, relays).
 
     A relay goes up at its centre and half width, down at its centre less that; outside of its loop both
-    branches agree. One that nothing has set yet is as `x` came to it from below or above first.
+    branches agree. One that nothing has set yet is as `x` came to it from below or above first. What reaches
+    a threshold but for rounding reaches it, as the ends of a course do those of relays that span it.
     """
-    up, down = x[:, None] >= centres + half_width, x[:, None] <= centres - half_width
+    reach = (1.0 - 1e-9) * half_width
+    up, down = x[:, None] >= centres + reach, x[:, None] <= centres - reach
     code = up.astype(np.int8) - down.astype(np.int8)
     last = np.maximum.accumulate(np.where(code != 0, np.arange(len(x))[:, None], -1), axis=0)
     virgin = np.where(centres > x[0], -1, 1).astype(np.int8)

@@ -109,3 +109,14 @@ def variances_isf(probability: float, above: int, below: float) -> float:
     from scipy.special import fdtri
 
     return float(fdtri(above, below, 1.0 - probability))
+
+
+def root_of(covariance: FloatArray) -> FloatArray:
+    """A matrix R with R R' the covariance, (k, k), of parameters whose units may differ by any factor.
+
+    In units of deviations, where rounding of the large ones does not outdo the small, it is the symmetric
+    one, which moves with the covariance: eigenvectors alone turn with the last digit, and draws with them.
+    """
+    scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T))

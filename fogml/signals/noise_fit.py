@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-from fogml.signals.distributions import chi2_ppf, normal_ppf
+from fogml.signals.distributions import chi2_ppf, normal_ppf, root_of
 from fogml.signals.noise_fit_data import FitData, Level, Part, fit_data
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.noise_terms import FLICKER_FLOOR
@@ -88,9 +88,7 @@ class NoiseFit:
 
     def draw(self, rng: np.random.Generator, count: int) -> list[NoiseModel]:
         """Models from the posterior, normal in the logarithms."""
-        values, vectors = np.linalg.eigh(self.covariance)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        factors = np.exp(rng.standard_normal((count, 3)) @ root.T)
+        factors = np.exp(rng.standard_normal((count, 3)) @ root_of(self.covariance).T)
         return [_scaled(self.model, row) for row in factors]
 
 

@@ -9,14 +9,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
-
-
-def root_of(covariance: FloatArray) -> FloatArray:
-    """A matrix R with R R' the covariance, (k, k), of parameters whose units may differ by any factor."""
-    # In units of deviations: in the parameters' own, rounding of the large ones outdoes the small.
-    scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+from fogml.signals.distributions import root_of
 
 
 @dataclass(frozen=True, eq=False)

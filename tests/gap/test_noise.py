@@ -79,6 +79,12 @@ def test_white_noise_of_a_run_is_as_large_as_it_is_however_much_may_be_made_of_i
     scatter = np.std([found for found, _ in told]) / 0.05
     assert {count for _, count in told} == {rows - 2 - 7 - steps}
     assert scatter == pytest.approx(1.4 / np.sqrt(rows - 9 - steps), rel=0.25)
+    # A constant that is another's multiple takes nothing more, though differences are rounded as values are.
+    rate = 3e8 + 10.0 * constants[:, 1:2]
+    run.constants = np.concatenate([constants, rate], axis=1)
+    one = white_noise(run, 1e-9, made)
+    run.constants = np.concatenate([constants, rate, 61.3 * rate], axis=1)
+    assert white_noise(run, 1e-9, made) == (pytest.approx(one[0], rel=1e-6), one[1])
     # Where all may be made, none is told.
     assert white_noise(run, 1e-9, [np.eye(rows)]) == (1e-9, 0)
 

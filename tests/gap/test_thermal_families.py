@@ -39,6 +39,13 @@ def test_a_plane_is_the_sum_of_its_relays():
     np.testing.assert_allclose(preisach(x, -20.0, 20.0, half), expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("off", [-1e-14, 0.0, 1e-14])
+def test_relays_at_the_ends_of_a_course_stay_outside_of_their_loops_whatever_rounding_makes_of_them(off):
+    x, half = _course() + off, 3.1
+    held = relays(x, np.linspace(_course().min() - half, _course().max() + half, 48), half)
+    assert not held[:, [0, -1]].any()
+
+
 def test_relays_of_one_half_width_make_the_play_operator():
     x, half = 25.0 * np.sin(np.arange(400) / 40.0), 5.0
     centres = np.linspace(-40.0, 40.0, 2001)

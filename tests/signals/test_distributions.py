@@ -66,3 +66,19 @@ def test_widths_of_intervals_are_those_of_the_normal_distribution():
     assert intervals.LEVEL == 0.9 and pytest.approx((0.05, 0.95)) == intervals.TAILS
     assert pytest.approx(intervals.Z50, rel=1e-4) == intervals.MEDIAN_SIZE
     assert pytest.approx(1.0, rel=1e-4) == intervals.MEDIAN_SIZE * intervals.SIGMA_PER_MEDIAN
+
+
+def test_draws_move_with_the_covariance_and_not_with_its_last_digits():
+    rng = np.random.default_rng(8)
+    turned = np.linalg.qr(rng.standard_normal((6, 6)))[0]
+    # Equal variances leave eigenvectors free to turn.
+    covariance = turned @ np.diag([4.0, 4.0, 4.0, 1.0, 1.0, 0.0]) @ turned.T
+    units = np.array([1e-9, 1.0, 1e6, 1.0, 1e3, 1.0])
+    covariance *= np.outer(units, units)
+    root = own.root_of(covariance)
+    np.testing.assert_allclose(
+        (root @ root.T) / np.outer(units, units), covariance / np.outer(units, units), atol=1e-12
+    )
+    rounding = 1e-15 * rng.standard_normal((6, 6))
+    other = own.root_of(covariance * (1.0 + rounding + rounding.T))
+    np.testing.assert_allclose(other / units[:, None], root / units[:, None], atol=1e-6)
