@@ -135,9 +135,9 @@ def page(rows: dict[str, Any], spread: dict[str, dict[str, float]]) -> str:
     lines = [
         "# The same commands on other processors",
         "",
-        "`python -m experiments.repeatability`: numerical libraries told to work as on processors with AVX2 or",
-        "with SSE3 alone, and with another count of threads, beside this one as it is. All numbers of the JSON",
-        "files of each job, relative to the larger of the two; those under 1e-9 count as zero. **Synthetic**",
+        "`python -m experiments.repeatability`: numerical libraries told to work as on processors with AVX2",
+        "or with SSE3 alone, one of them with two threads, beside this one as it is. All numbers of the JSON",
+        "files of each job, relative to the larger of two; those under 1e-9 count as zero. **Synthetic**",
         "(tactical twin) and the shipped recordings, a MEMS unit and a ring laser.",
         "",
         "| job | numbers | " + " | ".join(f"{m}: over 1e-6 | over 1e-3 | largest" for m in others) + " |",
