@@ -14,6 +14,7 @@ from fogml.blind.make import make_cases
 from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.gap.diagnosis import diagnose
+from fogml.gap.planning.lab import Lab
 from fogml.gap.planning.next_run import RepeatSettings
 from fogml.gap.planning.plan import plan_runs
 from fogml.gap.settings import Grids, Priors
@@ -33,7 +34,7 @@ from fogml.twin.twin_file import load_twin
 
 KINDS = (
     *(Priors, RowSettings, NoiseSettings, SearchSettings, Reported, Grids, RepeatSettings),
-    *(SizePriors, ChangePrior, LimitSettings, Resolution, FitSettings, Criteria),
+    *(SizePriors, ChangePrior, LimitSettings, Resolution, FitSettings, Criteria, Lab),
 )
 
 
@@ -43,7 +44,8 @@ def test_no_number_is_nan_infinite_text_or_a_flag(kind: Any) -> None:
     checked = 0
     for entry in fields(kind):
         several = isinstance(entry.default, tuple)
-        if entry.default is MISSING or isinstance(entry.default[0] if several else entry.default, str):
+        like = entry.default[0] if several else entry.default
+        if entry.default is MISSING or isinstance(like, str | bool):
             continue
         checked += 1
         for wrong in (math.nan, math.inf, "1", True, None):

@@ -95,9 +95,8 @@ class Bench:
         """The replay of temperatures as thermometers read them."""
         if not self.case.thermometers:
             return self.acting
-        twin = replace(self.on.model.twin, sensors=self.on.sensors)
-        programme = self.family.programme(DESIGN)
-        run = twin.simulate(programme, sample_s=FINE_S, facts=self.rehearsal.rows.run.facts, seed=seed).run
+        programme, facts = self.family.programme(DESIGN), self.rehearsal.rows.run.facts
+        run = self.on.acting.simulate(programme, sample_s=FINE_S, facts=facts, seed=seed).run
         return Replayer(run.with_columns(gyro=np.zeros(len(run))))
 
     def output(self, replayer: Replayer, constants: Mapping[str, float], *held: EffectValue) -> FloatArray:

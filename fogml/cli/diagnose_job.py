@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from fogml.cli.from_diagnosis import not_compensated, with_brought
+from fogml.cli.lab_settings import family_of
 from fogml.cli.runs import Check, no_check, open_noise, open_runs
 from fogml.cli.terminal import Terminal
 from fogml.cli.twin_commands import DiagnoseSettings
@@ -116,7 +117,7 @@ def diagnose_and_write(
     both = sorted(set(settings.runs) & set(settings.held_out))
     if both:
         raise InputError(f"{', '.join(both)}: both a fit run and held out; hold out another run")
-    model = TwinModel(load_twin(settings.twin))
+    model, family = TwinModel(load_twin(settings.twin)), family_of(settings.lab)
     with whole_folder(settings.out) as folder:
         runs = open_runs(settings.runs, terminal, repair=settings.repair, beside=settings.held_out)
         held_out = open_runs(settings.held_out, terminal, repair=settings.repair, beside=settings.runs)
@@ -145,6 +146,7 @@ def diagnose_and_write(
                 without=settings.without,
                 seed=settings.seed,
                 plan=settings.next_run,
+                family=family,
                 rehearsed=settings.rehearse,
                 cost_of_false_name=settings.cost_of_false_name,
                 courses=True,

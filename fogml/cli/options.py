@@ -63,6 +63,10 @@ def names_list(value: object) -> object:
 
 NAMES = BeforeValidator(names_list, json_schema_input_type=str | list[str])
 """What takes a list of names as one text with commas, too."""
+_NAMED = BeforeValidator(
+    lambda value: named_values(value) if isinstance(value, list) else value,
+    json_schema_input_type=dict[str, Any] | list[str],
+)
 Repairing = bool | Literal["anyway"]
 """Whether faulty rows are repaired, and ``anyway`` if however many that drops."""
 Repair = Annotated[
@@ -99,10 +103,7 @@ Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".', met
 Parameters = Annotated[
     dict[str, Any],
     option("Parameter of the model; may be repeated.", "--set"),
-    BeforeValidator(
-        lambda value: named_values(value) if isinstance(value, list) else value,
-        json_schema_input_type=dict[str, Any] | list[str],
-    ),
+    _NAMED,
 ]
 Averaging = Annotated[float, Field(gt=0.0), option("Averaging time of the figures.", metavar="SECONDS")]
 Strict = Annotated[
@@ -135,6 +136,13 @@ NextRun = Annotated[
         "Look for the programme of a run that would tell more; half of the time may go into it.",
         "--next-run/--no-next-run",
     ),
+]
+Lab = Annotated[
+    dict[str, Any],
+    option(
+        "Limit of the next run, as an option of 'plan': hottest=50, fastest_ramp=1; may be repeated.", "--lab"
+    ),
+    _NAMED,
 ]
 Twin = Annotated[
     str,

@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstr
 
 from fogml.cli import options
 from fogml.cli.given import load, option
+from fogml.cli.lab_settings import LabSettings
 from fogml.cli.settings import Settings, absolute, placed, setting
 
 
@@ -113,6 +114,7 @@ class DiagnoseSettings(Settings):
     )
     cost_of_false_name: options.CostOfFalseName = 1.0
     next_run: options.NextRun = True
+    lab: options.Lab = {}
     rehearse: bool = setting(False, "Tell what these runs would name of each candidate.", "--rehearse")
     repair: options.Repair = False
     out: options.Folder = "diagnosis"
@@ -123,13 +125,23 @@ def _groups(value: Any) -> Any:
     return [options.names_list(group) for group in value] if isinstance(value, list) else value
 
 
+def _each(value: Any) -> Any:
+    """Names, of which some may come as one text with commas between."""
+    if isinstance(value, list) and all(isinstance(one, str) for one in value):
+        return [name.strip() for one in value for name in one.split(",")]
+    return options.names_list(value)
+
+
+_Names = Annotated[list[str], BeforeValidator(_each, json_schema_input_type=str | list[str])]
+
+
 def _usual_latitude() -> float:
     from fogml.twin.simulate import DEFAULT_FACTS
 
     return DEFAULT_FACTS.latitude or 0.0
 
 
-class PlanSettings(Settings):
+class PlanSettings(LabSettings, Settings):
     """Programmes that make wanted parameters identifiable, with expected standard errors.
 
     Searches rates, limits, soaks, a minor loop, table rates, power steps, fan and yaw. Writes
@@ -138,7 +150,7 @@ class PlanSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.plan_job:plan_and_write"
-    want: list[str] = setting(
+    want: _Names = setting(
         [],
         "Effect, nominal constant (k1), or EFFECT.PARAMETER to be known; may be repeated.",
         metavar="EFFECT|CONSTANT",
@@ -152,7 +164,6 @@ class PlanSettings(Settings):
         metavar="A,B",
         known=options.EFFECTS,
     )
-    hours: float = setting(24.0, "Longest time of a run.", metavar="HOURS")
     criterion: Annotated[str, StringConstraints(to_upper=True)] = setting(
         "D",
         "D: volume of the confidence ellipsoid; A: mean square of the standard errors.",
@@ -161,16 +172,14 @@ class PlanSettings(Settings):
     )
     runs: int = setting(1, "How many runs, planned in turn.")
     twin: options.Twin = "nominal"
-    coldest: float = setting(-40.0, "Lowest temperature.", metavar="DEGC")
-    hottest: float = setting(60.0, "Highest temperature.", metavar="DEGC")
     input_axis: str | None = setting(
         None, "up, down, north ...: the mounting; up or north is tried else.", metavar="WAY"
     )
     latitude: Annotated[float, option("Of the lab (39.9).", metavar="DEG")] = Field(
         default_factory=_usual_latitude
     )
-    power_steps: bool = setting(
-        True, "Whether the unit's power may be switched.", "--power-steps/--no-power-steps"
+    columns: _Names = setting(
+        [], "What is recorded beside time and gyro; as 'simulate' does if none.", metavar="A,B"
     )
     out: options.Folder = "plan"
 

@@ -19,6 +19,7 @@ from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_bac
 from fogml.gap.model import AnyModel, TwinModel
 from fogml.gap.own_simulator import candidates_of
 from fogml.gap.planning.next_run import next_run
+from fogml.gap.planning.programme_family import Family
 from fogml.gap.planning.rehearsal import rehearse
 from fogml.gap.posterior import Cause, Judgement, doubted
 from fogml.gap.reports import candidate_evidence, noise_of, series_of, stage_energies
@@ -76,6 +77,7 @@ def diagnose(
     seed: int = 0,
     priors: Priors | None = None,
     plan: bool = True,
+    family: Family | None = None,
     rehearsed: bool = False,
     cost_of_false_name: float = 1.0,
     courses: bool = False,
@@ -101,6 +103,8 @@ def diagnose(
         What is taken for granted.
     plan
         Whether to look for a programme that would tell more.
+    family
+        What the lab can do for it, and for how long; as usual if None. Its mountings are those of the runs.
     rehearsed
         Whether to tell what these runs would name of each candidate.
     cost_of_false_name
@@ -122,7 +126,8 @@ def diagnose(
     fit, held_out, noise = runs_of(fit), runs_of(held_out), None if noise is None else one_run(noise)
     found = inferred(model, fit, held_out, noise, without, priors, tell)
     tell("judging on held-out runs")
-    return answered(found, noise, not held_out, seed, cost_of_false_name, plan, rehearsed, courses, tell)
+    within = (family or Family()) if plan else None
+    return answered(found, noise, not held_out, seed, cost_of_false_name, within, rehearsed, courses, tell)
 
 
 def check_cost(of_false_name: float) -> None:
@@ -171,19 +176,22 @@ def answered(
     part: bool,
     seed: int,
     cost_of_false_name: float,
-    plan: bool = False,
+    family: Family | None = None,
     rehearsed: bool = False,
     courses: bool = False,
     tell: Progress = lambda what: None,
 ) -> Diagnosis:
-    """What is said of a posterior; `part` where the last stretch of the last run was held out."""
+    """What is said of a posterior; `part` where the last stretch of the last run was held out.
+
+    With a `family` of programmes the next run is looked for among those.
+    """
     with one_thread():
         told = explained(found, cost_of_false_name)
         found, judged = told.found, told.judged
         answer = _answer(told, noise, part, seed, courses)
-        if plan:
+        if family is not None:
             open_ = answer.verdict in ("unknown", "partly_explained")
-            run = next_run(found, judged, answer.found, answer.undetectable, seed, tell, open_)
+            run = next_run(found, judged, answer.found, answer.undetectable, seed, tell, open_, family)
             answer = replace(answer, separating_run=run)
         if rehearsed:
             tell("rehearsing each candidate")

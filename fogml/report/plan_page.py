@@ -8,6 +8,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from fogml.gap.planning.rehearsal import FORMS
 from fogml.gap.result_parts import Rehearsed
 from fogml.numerals import MISSING, duration, listed, number, plural, stated, unit_words
 from fogml.report import style
@@ -167,14 +168,28 @@ def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
     if shown:
         sentences.append(f"Known better afterwards: {listed(shown)}.")
     if hidden:
-        sentences.append(f"No programme within these hours shows {listed(hidden)}.")
+        sentences.append(f"Of what was tried, the best programme does not show {listed(hidden)}.")
     for item in values["separations"]:
         what = " from ".join(item["separates"]) if len(item["separates"]) < 3 else listed(item["separates"])
         verb = "shows" if len(item["separates"]) == 1 else "tells"
         end = "" if len(item["separates"]) < 3 else " apart"
         doing = verb if item not in close else f"does not {verb[:-1]}"
         sentences.append(f"It {doing} {what}{end} (distance {number(item['distance'])}).")
+    unnamed = _unnamed(values)
+    if unnamed:
+        sentences.append(
+            f"A diagnosis of these runs, which does not know beforehand what to look for, would not name "
+            f"{listed(unnamed)} of usual size."
+        )
     return sentences
+
+
+def _unnamed(values: Mapping[str, Any]) -> list[str]:
+    """Effects that are asked for and that the rehearsal says a diagnosis would miss or mistake."""
+    asked = {e["name"].partition(".")[0] for e in values["wanted"]}
+    asked |= {id for item in values["separations"] for id in item["separates"]}
+    usual = {r["effect"]: r["outcome"] for r in values.get("rehearsal", ()) if r["form"] == FORMS[0]}
+    return [id for id, outcome in usual.items() if id in asked and outcome != "named"]
 
 
 def _tiles(values: Mapping[str, Any]) -> list[Tile]:
@@ -275,6 +290,14 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("criterion", words[values["criterion"]]),
         ("longest run", f"{stated(values['hours'])} h"),
         ("temperatures", f"{stated(low_high[0])} to {stated(low_high[1])} °C"),
+        *(
+            (name, f"{stated(values[key])} {unit}")
+            for name, key, unit in (
+                ("fastest ramp", "fastest_ramp_degC_min", "°C/min"),
+                ("fastest turn", "fastest_turn_deg_s", "deg/s"),
+            )
+            if key in values
+        ),
         ("noise N", f"{number(noise['N'])} deg/√h"),
         ("noise B", f"{number(noise['B'])} deg/h"),
         ("noise K", f"{number(noise['K'])} deg/h/√h"),

@@ -46,7 +46,7 @@ DEFAULT_COLUMNS = (
 DEFAULT_FACTS = Facts(axis="x", latitude=39.9, input_axis="up")
 BLOCK_ROWS = 3 << 14
 """Samples worked out at once: many enough that two threads seldom wait for each other's turn."""
-_NO_SENSOR = ("time", "gyro", REPLAYED)
+NO_SENSOR = ("time", "gyro", REPLAYED)
 _ROUNDED = 1e-6
 """Of a count: what a rate's digits leave of it."""
 
@@ -244,8 +244,8 @@ def world_of(
         stated = stated.model_copy(update={"scale_factor": ScaleFactor(value=counts)})
     names = tuple(DEFAULT_COLUMNS if columns is None else columns)
     for name in names:
-        if name in _NO_SENSOR or (name not in KNOWN and coil_sensor_number(name) is None):
-            known = [key for key in KNOWN if key not in _NO_SENSOR]
+        if name in NO_SENSOR or (name not in KNOWN and coil_sensor_number(name) is None):
+            known = [key for key in KNOWN if key not in NO_SENSOR]
             raise InputError(
                 f"columns: '{name}' can't be recorded; {known_are(name, known)} and coil sensors T1, T2 ..."
             )

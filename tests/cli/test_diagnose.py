@@ -38,6 +38,8 @@ PROGRAMMES = {
 }
 HYSTERESIS = 0.3
 SAMPLE_S = 30.0
+LAB = {"hours": 14, "coldest": -15, "hottest": 45, "fastest_ramp": 0.8, "fastest_turn": 5}
+"""What the lab can do for the next run."""
 
 
 def steps(levels: tuple[int, ...]) -> list[str]:
@@ -68,7 +70,8 @@ def diagnosed(runs, tmp_path_factory) -> Path:
     """The folder that a diagnosis of the three wrote."""
     out = tmp_path_factory.mktemp("diagnosis") / "out"
     given = [str(runs["a"]), str(runs["b"]), "--held-out", str(runs["c"]), "--out", str(out)]
-    result = CliRunner().invoke(app, ["diagnose", *given, "--rehearse"], catch_exceptions=False)
+    lab = [word for limit in LAB.items() for word in ("--lab", "{}={}".format(*limit))]
+    result = CliRunner().invoke(app, ["diagnose", *given, "--rehearse", *lab], catch_exceptions=False)
     assert result.exit_code == 0, result.stderr
     assert re.search("Verdict: (explained|ambiguous)", result.stdout)
     return out
@@ -90,6 +93,14 @@ def test_the_next_run_is_a_programme_to_simulate(diagnosed, gap):
     programme = load_programme(str(diagnosed / "next-run.yaml"))
     assert math.isclose(programme.total_hours, gap["separating_run"]["hours"])
     assert gap["separating_run"]["programme"] == (diagnosed / "next-run.yaml").read_text(encoding="utf-8")
+    assert 0.0 < programme.total_hours <= LAB["hours"]
+    set_points, rates = programme.schedule.set_point.arrays, programme.schedule.table_rate.values
+    assert LAB["coldest"] <= set_points[1].min() < set_points[1].max() <= LAB["hottest"]
+    slopes = np.abs(np.diff(set_points[1])) / np.diff(set_points[0] / 60.0)
+    assert slopes.max() <= LAB["fastest_ramp"] * (1.0 + 1e-9)
+    assert max(map(abs, rates), default=0.0) <= LAB["fastest_turn"]
+    # Mounted as the runs were.
+    assert programme.input_axis == "up"
 
 
 def test_gap_json_holds_every_key(gap):

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from functools import partial
 
+import numpy as np
 import pytest
 import yaml
 
 from fogml.gap.planning.plan import plan_runs
+from fogml.report.plan_page import verdict_sentences
 from fogml.runs.reading import read_run
 from fogml.twin.programme import load_programme
 
@@ -49,12 +51,42 @@ def test_plan_then_simulate(tmp_path, invoke, invoke_json, monkeypatch):
         "simulate", "--programme", out / "programme.yaml", "--twin", "nominal", "--sample", "60", "-o", run
     )
     first = read_run(run)
-    # The simulation's own file states the set-up as well.
+    # The simulation's own file states the set-up as well, and the heat that is assumed.
     config = yaml.safe_load((out / "simulation.yaml").read_text())
     assert config["facts"]["input_axis"] == "up"
     monkeypatch.chdir(out)
     invoke("simulate", "simulation.yaml", "--sample", "60", "-o", tmp_path / "again.csv")
-    assert (read_run(tmp_path / "again.csv").gyro == first.gyro).all()
+    again = read_run(tmp_path / "again.csv")
+    coil = values["runs"][0]["profile"]["coil"]
+    expected = np.interp(again.time, coil["time_s"], coil["value"])
+    off, without = (np.abs(run.columns["T_in"] - expected) for run in (again, first))
+    assert np.median(off) < 0.5 and np.median(without) > 2.0
+
+
+def test_a_programme_carries_the_mounting_and_a_simulation_what_is_recorded(tmp_path, invoke_json, invoke):
+    out = tmp_path / "plan"
+    ask = ("plan", "--want", "b1,m", "--hours", "5", "--input-axis", "east", "--columns", "T,rate")
+    values = invoke_json(*ask, "--fastest-ramp", "1.5", "--no-yaw", "--fastest-turn", "0", "-o", out)
+    assert [one["name"] for one in values["wanted"]] == ["b1", "m"]
+    assert (values["fastest_ramp_degC_min"], values["fastest_turn_deg_s"]) == (1.5, 0.0)
+    runs = tmp_path / "by-hand.csv", tmp_path / "by-file.csv"
+    invoke("simulate", "--programme", out / "programme.yaml", "--sample", "60", "-o", runs[0])
+    invoke("simulate", out / "simulation.yaml", "--sample", "60", "-o", runs[1])
+    assert [read_run(run).facts.input_axis for run in runs] == ["east", "east"]
+    assert set(read_run(runs[1]).columns) == {"time", "gyro", "T", "rate"}
+
+
+def test_the_verdict_tells_what_a_diagnosis_would_not_name():
+    apart = {"separates": ["thermal_hysteresis", "stress_relaxation"], "distance": 7.0, "enough": True}
+    rehearsal = [
+        {"effect": "thermal_hysteresis", "form": "usual", "outcome": "named"},
+        {"effect": "stress_relaxation", "form": "usual", "outcome": "missed"},
+        {"effect": "stress_relaxation", "form": "low", "outcome": "named"},
+        {"effect": "ageing", "form": "usual", "outcome": "missed"},
+    ]
+    values = {"wanted": [], "separations": [apart], "runs": [{}], "total_hours": 9.0, "rehearsal": rehearsal}
+    assert verdict_sentences(values)[-1].endswith("would not name stress_relaxation of usual size.")
+    assert "It tells" in verdict_sentences({**values, "rehearsal": []})[-1]
 
 
 def test_the_configuration_gives_the_same_plan_again(tmp_path, invoke_json, invoke):
@@ -66,7 +98,7 @@ def test_the_configuration_gives_the_same_plan_again(tmp_path, invoke_json, invo
     assert values == invoke_json("plan", "--config", written, "-o", tmp_path / "two")
     # It is k1 under another name, and the page says that it does not show.
     assert not values["wanted"][0]["shown"]
-    assert "No programme within these hours shows" in (tmp_path / "one" / "plan.html").read_text()
+    assert "the best programme does not show" in (tmp_path / "one" / "plan.html").read_text()
 
 
 @pytest.mark.parametrize(
@@ -80,6 +112,8 @@ def test_the_configuration_gives_the_same_plan_again(tmp_path, invoke_json, invo
         (("--want", "k1", "--twin", "nothing.yaml"), "nothing.yaml"),
         (("--want", "k1", "--coldest", "40"), "temperature limits"),
         (("--want", "k1", "--input-axis", "sideways"), "input_axis"),
+        (("--want", "k1", "--fastest-ramp", "0"), "'fastest_ramp' is 0"),
+        (("--want", "k1", "--columns", "T_foo"), "can't be recorded"),
     ],
 )
 def test_faults(tmp_path, invoke, arguments, message):

@@ -9,6 +9,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.gap.planning.fisher import covariance, expected, information, merit, responses, unknowns
+from fogml.gap.planning.lab import Lab
 from fogml.gap.planning.plan import plan_runs
 from fogml.gap.planning.plan_result import plan_values
 from fogml.gap.planning.programme_family import Design, Family
@@ -16,6 +17,7 @@ from fogml.gap.planning.rehearsal import FINE_S, Rehearsal, Together, stage
 from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.noise import NoiseConstants
 from fogml.twin.registry import effect
 from fogml.twin.replay import Replayer
 from fogml.twin.set_up import SensorErrors, Sensors
@@ -210,6 +212,14 @@ def test_scale_factor_is_planned_with_turns():
     assert error.se < 0.01 * error.prior
 
 
+def test_what_the_twin_has_beside_what_is_asked_is_told_to_be_taken_as_known():
+    ask = {"hours": 5.0, "most": 1, "facts": FACTS}
+    told = plan_runs(load_twin("tactical"), ["shupe_pure"], **ask).assumed
+    (known,) = (text for text in told if "taken as known exactly" in text)
+    assert "thermal_hysteresis" in known and "shupe_pure" not in known
+    assert not any("exactly" in text for text in plan_runs(TWIN, ["b1"], **ask).assumed)
+
+
 def test_what_is_within_the_constants_is_said_not_to_show():
     plan = plan_runs(TWIN, ["coil_expansion"], hours=5.0, most=20, facts=FACTS)
     (error,) = plan.outlook.errors
@@ -225,6 +235,10 @@ def test_what_is_within_the_constants_is_said_not_to_show():
         ({"want": ["k9"]}, "constants are b0, b1, b2, e0"),
         ({"want": ["thermal_hysteresis.width"]}, "it has amplitude, half_width"),
         ({"want": ["angle_random_walk"]}, "is a random error"),
+        ({"want": ["turn_on_bias"]}, "drawn by chance"),
+        ({"want": [], "separate": [["thermal_shock", "shupe_pure"]]}, "drawn by chance"),
+        ({"want": ["k1"], "twin": replace(TWIN, noise=NoiseConstants())}, "no white noise"),
+        ({"want": ["k1"], "lab": Lab(fastest_ramp=0.5), "hours": 5.0}, "the shortest programme"),
         ({"want": ["k1"], "hours": 1.0}, "the shortest programme"),
         ({"want": ["k1"], "criterion": "E"}, "D or A was expected"),
         ({"want": ["k1"], "runs": 0}, "1 to 8 can be planned"),
@@ -233,4 +247,4 @@ def test_what_is_within_the_constants_is_said_not_to_show():
 )
 def test_what_cannot_be_planned_is_refused(ask, message):
     with pytest.raises(InputError, match=message):
-        plan_runs(TWIN, **ask)
+        plan_runs(**{"twin": TWIN, **ask})

@@ -190,8 +190,8 @@ def test_members_of_a_class_are_told_apart_at_the_sizes_that_they_would_have(fou
     )
     asked = {}
 
-    def told(twin, noise, constants, members, **rest):
-        asked.update(members=members, **rest)
+    def told(on, family, members, **rest):
+        asked.update(on=on, family=family, members=members, **rest)
         return "a run"
 
     monkeypatch.setattr(ahead, "separating_run", told)
@@ -200,6 +200,10 @@ def test_members_of_a_class_are_told_apart_at_the_sizes_that_they_would_have(fou
     own, other = asked["members"]
     assert own.amplitude == pytest.approx(cards_of(found, judged)[own.id].lacking, rel=0.3)
     assert other.amplitude != 0.0
+    # As the first run was: its columns, and mounted as it was.
+    first = found.scene.runs[0].run
+    assert {*asked["on"].columns, "time", "gyro"} == {*first.columns} and asked["on"].facts == first.facts
+    assert asked["family"].mountings == (None,)
     alone = SimpleNamespace(effect="thermal_hysteresis", named=True, members=("thermal_hysteresis",))
     assert ahead.next_run(found, judged, [alone], (), 3, print) is None
 

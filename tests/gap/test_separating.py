@@ -87,22 +87,25 @@ def test_noise_twice_as_large_halves_the_distance_at_most(rehearsed):
 
 
 def test_only_heat_from_within_separates_electronics_and_plate():
-    ask = {"facts": FACTS, "most": 60, "seed": 4}
-    found = separating_run(TWIN, NOISE, CONSTANTS, [ELECTRONICS, PLATE], **ask)
+    on, ask = stage(TWIN, NOISE, CONSTANTS, facts=FACTS), {"most": 60, "seed": 4}
+    found = separating_run(on, Family(), [ELECTRONICS, PLATE], **ask)
     assert found is not None and found.distance >= LEAST_DISTANCE
     assert "power" in "".join(found.steps)
-    assert separating_run(TWIN, NOISE, CONSTANTS, [ELECTRONICS, PLATE], power_steps=False, **ask) is None
+    assert separating_run(on, Family(power_steps=False), [ELECTRONICS, PLATE], **ask) is None
 
 
 def test_a_separating_run_is_ready_to_simulate_and_repeats():
-    ask = {"hours": 14.0, "facts": FACTS, "most": 15}
-    found = separating_run(TWIN, NOISE, CONSTANTS, [HYSTERESIS, RELAXATION], seed=5, **ask)
-    again = separating_run(TWIN, NOISE, CONSTANTS, [HYSTERESIS, RELAXATION], seed=5, **ask)
+    north = FACTS.model_copy(update={"input_axis": "north"})
+    on, family = stage(TWIN, NOISE, CONSTANTS, facts=north), Family(14.0, mountings=(None,))
+    found = separating_run(on, family, [HYSTERESIS, RELAXATION], seed=5, most=15)
+    again = separating_run(on, family, [HYSTERESIS, RELAXATION], seed=5, most=15)
     assert found is not None and found == again
     programme = load_programme(yaml.safe_load(found.programme))
     assert programme.total_hours == pytest.approx(found.hours) and found.hours <= 14.0
     assert found.separates == ("thermal_hysteresis", "stress_relaxation")
     run = TWIN.simulate(programme, sample_s=60.0).run
+    # Nothing else is stated to simulate it as it is mounted.
+    assert run.facts.input_axis == "north"
     assert np.ptp(run.temperature()) > 10.0
     for other in found.alternatives:
         shorter = load_programme(yaml.safe_load(other["programme"])).total_hours
@@ -112,13 +115,13 @@ def test_a_separating_run_is_ready_to_simulate_and_repeats():
 
 
 def test_a_single_effect_is_to_be_shown_and_a_small_one_cannot_be():
-    ask = {"hours": 8.0, "facts": FACTS, "most": 15}
-    found = separating_run(TWIN, NOISE, CONSTANTS, [HYSTERESIS], **ask)
+    on, family = stage(TWIN, NOISE, CONSTANTS, facts=FACTS), Family(8.0)
+    found = separating_run(on, family, [HYSTERESIS], most=15)
     assert found is not None and found.separates == ("thermal_hysteresis",)
     small = replace(HYSTERESIS, amplitude=1e-4)
-    assert separating_run(TWIN, NOISE, CONSTANTS, [small], **ask) is None
+    assert separating_run(on, family, [small], most=15) is None
     # In the span of the nominal constants nothing helps.
-    assert separating_run(TWIN, NOISE, CONSTANTS, [EffectValue("coil_expansion", 5.0)], **ask) is None
+    assert separating_run(on, family, [EffectValue("coil_expansion", 5.0)], most=15) is None
 
 
 @pytest.mark.parametrize(
@@ -132,7 +135,7 @@ def test_a_single_effect_is_to_be_shown_and_a_small_one_cannot_be():
 )
 def test_what_cannot_be_separated_is_refused(members, message):
     with pytest.raises(InputError, match=message):
-        separating_run(TWIN, NOISE, CONSTANTS, members)
+        separating_run(stage(TWIN, NOISE, CONSTANTS), Family(), members)
 
 
 @pytest.mark.parametrize(("limits", "gain"), [((0.0, 2.0), 0.0), ((-2.0, 1.0), 4.5)])

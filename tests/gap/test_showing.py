@@ -54,17 +54,18 @@ def test_the_length_of_a_dead_zone_is_that_at_its_own_size():
 
 def test_what_needs_turns_or_a_changed_temperature_gets_them():
     ids = ["sf_asymmetry", "thermal_hysteresis", "coil_expansion", "sensor_quantisation"]
-    ask = {"facts": FACTS, "hours": 12.0, "most": 40}
-    found = showing_run(TWIN, NOISE, CONSTANTS, ids, **ask)
+    on, family = stage(TWIN, NOISE, CONSTANTS, facts=FACTS), Family(12.0)
+    found = showing_run(on, family, ids, most=40)
     # An expansion of the coil is one with the nominal scale factor, and steps are read off a record.
     assert found is not None and found.separates == ("sf_asymmetry", "thermal_hysteresis")
     assert found.distance >= LEAST_DISTANCE and found.hours <= 12.0
     text = "; ".join(found.steps)
     assert "turn" in text and "ramp" in text
     assert load_programme(yaml.safe_load(found.programme)).total_hours == pytest.approx(found.hours)
-    assert showing_run(TWIN, NOISE, CONSTANTS, ids, **ask) == found
+    assert showing_run(on, family, ids, most=40) == found
 
 
 def test_where_no_programme_helps_none_is_told():
-    assert showing_run(TWIN, NOISE, CONSTANTS, ["coil_expansion"], facts=FACTS, most=10) is None
-    assert showing_run(TWIN, NOISE, CONSTANTS, ["sensor_quantisation"], facts=FACTS, most=10) is None
+    on = stage(TWIN, NOISE, CONSTANTS, facts=FACTS)
+    assert showing_run(on, Family(), ["coil_expansion"], most=10) is None
+    assert showing_run(on, Family(), ["sensor_quantisation"], most=10) is None

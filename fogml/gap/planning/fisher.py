@@ -134,7 +134,7 @@ def usual_value(on: Stage, id: str, constants: Sequence[str] | set[str] = ()) ->
     Raises
     ------
     InputError
-        If there is none of this id, or it is a random error.
+        If there is none of this id, or it is a random error or drawn by chance.
     """
     try:
         declared = effect(id)
@@ -145,6 +145,11 @@ def usual_value(on: Stage, id: str, constants: Sequence[str] | set[str] = ()) ->
         raise InputError(
             f"effect '{id}' is a random error: no programme shows it better than a long static run; "
             "see fogml noise"
+        )
+    if declared.seeded:
+        raise InputError(
+            f"effect '{id}' is drawn by chance each time that the unit is used: how well its size is known "
+            "goes with how often that is, not with a run's programme; diagnose several runs together"
         )
     return stated_or_usual(on, declared)
 

@@ -5,7 +5,7 @@ For what is not known it is a repeat: whether it goes with temperature, with pow
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -20,20 +20,20 @@ from fogml.gap.model import EffectValue, TwinModel
 from fogml.gap.planning.fisher import stated_or_usual
 from fogml.gap.planning.programme_family import Design, Family
 from fogml.gap.planning.programme_search import finely, search
-from fogml.gap.planning.rehearsal import COARSE_S, FINE_S, Rehearsal, stage
+from fogml.gap.planning.rehearsal import COARSE_S, FINE_S, Rehearsal, Stage, stage
 from fogml.gap.planning.separating import LEAST_DISTANCE, run_of, separating_run
 from fogml.gap.posterior import Judgement
 from fogml.gap.result import Found, SeparatingRun
 from fogml.gap.rows import Rows, at_amplitude
 from fogml.numerals import ascii_number
-from fogml.runs.facts import Facts
+from fogml.runs.columns import KNOWN, coil_sensor_number
+from fogml.runs.run import Run
 from fogml.settings_check import check_numbers
 from fogml.signals.bases import corners
-from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.programme import Programme, programme_from
 from fogml.twin.registry import effect
-from fogml.twin.twin import Twin
+from fogml.twin.simulate import NO_SENSOR
 
 
 @dataclass(frozen=True)
@@ -73,15 +73,16 @@ PLENTY = 2.0 * LEAST_DISTANCE
 """Length from which getting longer does not count any more."""
 
 
-def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
+def repeat_run(found: Inference, every: Foretold, power_steps: bool = True) -> SeparatingRun | None:
     """The run in which the unknown shows most, again, with the power on some hours before the chamber moves.
 
     What goes with temperature comes that much later after power-on than it did, what goes with power-on does
-    not, and what comes anew each time does neither. None where the unknown is too short for that in all runs.
+    not, and what comes anew each time does neither. None where the unknown is too short for that in all runs,
+    or the power may not be switched.
     """
     scene = found.scene
     unknown = [m for m in every.members if found.kind(m) == "unknown"]
-    if not unknown:
+    if not (unknown and power_steps):
         return None
     courses = [np.sum([every.of_member(i, m) for m in unknown], axis=0) for i in range(scene.fitted)]
     lengths = [_length(found, i, course) for i, course in enumerate(courses)]
@@ -106,7 +107,7 @@ def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
     }
     if fastest > Programme.fastest_rate:
         values["fastest_rate"] = f"{ascii_number(fastest)} degC/min"
-    programme = programme_from(values, "repeat-run")
+    programme = replace(programme_from(values, "repeat-run"), input_axis=rows.run.facts.input_axis)
     total = REPEAT.off_h + hours + float(rows.run.span_s) / 3600.0
     told = (f"{soak} {REPEAT.off_h:g} h, power off", f"{soak} {hours:g} h, power on", *course_again)
     separates = ("temperature", "power-on", "time")
@@ -161,40 +162,54 @@ def next_run(
     seed: int,
     tell: Callable[[str], None],
     unknown: bool = False,
+    family: Family | None = None,
 ) -> SeparatingRun | None:
     """The programme that tells the members of the most probable class of several apart.
 
     Where each named effect stands alone and something `unknown` acts, the one that tells what that goes with;
     else the one that shows what these runs could not. None where there is nothing to tell, no programme does,
-    or the model can't simulate one.
+    or the model can't simulate one. The unit is mounted and recorded as in the first of these runs.
+
+    Parameters
+    ----------
+    found, judged, items, undetectable
+        The posterior, what it names, what that is told as, and what these runs could not show.
+    seed
+        Of the search.
+    tell
+        Told what is being done.
+    unknown
+        Whether something unknown acts.
+    family
+        What the lab can do, and for how long; as usual if None. A repeat takes as long as what it repeats.
     """
+    family = replace(family or Family(), mountings=(None,))
     several = any(f.named and len(f.members) > 1 for f in items)
     if unknown and not several:
-        repeat = repeat_run(found, Foretold.of(found, judged.best.members))
+        repeat = repeat_run(found, Foretold.of(found, judged.best.members), family.power_steps)
         if repeat is not None:
             return repeat
     if not isinstance(found.model, TwinModel):
         return None
     twin, noise = found.model.twin, found.field.whitening.noise
-    facts, values = found.scene.runs[0].run.facts, found.setting.values
+    first, values = found.scene.runs[0].run, found.setting.values
+    on = stage(twin, noise, values, facts=first.facts, columns=_recorded(first))
     open_ = next((f for f in items if f.named and len(f.members) > 1), None)
     if open_ is None:
         if not undetectable:
             return None
-        return showing_run(twin, noise, values, undetectable, seed=seed, progress=tell, facts=facts)
+        return showing_run(on, family, undetectable, seed=seed, progress=tell)
     members = _members(found, judged, open_)
     if len(members) < 2:
         return None
-    return separating_run(
-        twin,
-        noise,
-        values,
-        members,
-        seed=seed,
-        progress=tell,
-        facts=facts,
-        most=MOST_PROGRAMMES,
-    )
+    return separating_run(on, family, members, seed=seed, progress=tell, most=MOST_PROGRAMMES)
+
+
+def _recorded(run: Run) -> list[str]:
+    """Columns of a run that a simulation records as well."""
+    return [name for name in run.columns if name in KNOWN and name not in NO_SENSOR] + [
+        name for name in run.columns if coil_sensor_number(name) is not None
+    ]
 
 
 def _members(found: Inference, judged: Judgement, item: Found) -> list[EffectValue]:
@@ -212,22 +227,19 @@ def _members(found: Inference, judged: Judgement, item: Found) -> list[EffectVal
 
 
 def showing_run(
-    twin: Twin,
-    noise: NoiseModel,
-    constants: Mapping[str, float],
+    on: Stage,
+    family: Family,
     ids: Sequence[str],
     *,
-    hours: float = 24.0,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
-    facts: Facts | None = None,
     most: int = MOST_PROGRAMMES,
 ) -> SeparatingRun | None:
     """The programme that shows as many effects as it can at their usual size.
 
     Parameters
     ----------
-    twin, noise, constants, hours, seed, progress, facts, most
+    on, family, seed, progress, most
         As in `fogml.gap.planning.separating.separating_run`.
     ids
         The effects. Those that a record itself tells, such as the steps of its sensors, no programme shows
@@ -239,8 +251,6 @@ def showing_run(
         ``separates`` are the effects that reach a whitened length of `LEAST_DISTANCE` beside the constants,
         ``distance`` is the least of theirs. None where no effect does.
     """
-    on = stage(twin, noise, constants, facts=facts)
-    family = Family(hours, (-40.0, 60.0), ("up", "north") if facts is None else (None,), True)
     usual = [stated_or_usual(on, effect(id)) for id in ids if _may_show(effect(id))]
     if not usual:
         return None
@@ -256,7 +266,7 @@ def showing_run(
     if not shown:
         return None
     least = float(min(length for _, length in shown))
-    run = run_of(family, finals[:1], [id for id, _ in shown], least, "showing-run")
+    run = run_of(on, family, finals[:1], [id for id, _ in shown], least, "showing-run")
     return replace(run, aim="show")
 
 

@@ -6,11 +6,11 @@ Runs are planned one after another, each for what those before it leave open.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, listed
 from fogml.gap.inference import foreseen
 from fogml.gap.model import TwinModel
 from fogml.gap.planning.fisher import (
@@ -23,6 +23,7 @@ from fogml.gap.planning.fisher import (
     unknowns,
     usual_value,
 )
+from fogml.gap.planning.lab import Lab
 from fogml.gap.planning.plan_result import ExpectedError, Outlook, Plan, PlannedRun, Separation
 from fogml.gap.planning.programme_family import Design, Family, Mounting
 from fogml.gap.planning.programme_search import MOST_RUNS, Tried, finely, search
@@ -34,6 +35,7 @@ from fogml.gap.planning.rehearsal import (
     Stage,
     Together,
     mounted,
+    planned,
     rehearse,
     stage,
 )
@@ -43,7 +45,6 @@ from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
 from fogml.settings_check import check_whole
 from fogml.signals.noise_model import NoiseModel
-from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import NAMES
 from fogml.twin.twin import Twin
 
@@ -102,6 +103,7 @@ def plan_runs(
     mountings: Sequence[Mounting] | None = None,
     columns: Sequence[str] | None = None,
     power_steps: bool = True,
+    lab: Lab | None = None,
     seed: int = 0,
     most: int = MOST_RUNS,
     rehearsed: bool = False,
@@ -139,6 +141,8 @@ def plan_runs(
         What a run records; what `fogml simulate` does if None.
     power_steps
         Whether the power may be switched.
+    lab
+        What chamber, table and fixture can do; as usual if None.
     seed
         Of the search.
     most
@@ -164,9 +168,9 @@ def plan_runs(
     if not 1 <= runs <= MOST_PLANNED:
         raise InputError(f"{runs} runs: 1 to {MOST_PLANNED} can be planned")
     ways: tuple[Mounting | None, ...] = ("up", "north") if facts is None else (None,)
-    family = Family(hours, limits, ways if mountings is None else tuple(mountings), power_steps)
-    if noise is None:
-        noise = NoiseModel(twin.noise.N, twin.noise.B, twin.noise.K)
+    given = ways if mountings is None else tuple(mountings)
+    family = Family(hours, limits, given, power_steps, lab or Lab())
+    noise = _noise_of(twin) if noise is None else noise
     values, assumed = _values(twin)
     on = stage(twin, noise, values, facts=facts, columns=columns)
     goal = _Goal(
@@ -174,10 +178,10 @@ def plan_runs(
         tuple(members_of(on, family, [usual_value(on, id) for id in group]) for group in separate),
         criterion,
     )
-    planned: list[PlannedRun] = []
+    runs_planned: list[PlannedRun] = []
     for number in range(runs):
         tell = _numbered(progress, number, runs)
-        planned.append(_next_run(on, family, goal, planned, seed + number, most, tell))
+        runs_planned.append(_next_run(on, family, goal, runs_planned, seed + number, most, tell))
     return Plan(
         twin.name,
         twin.grade,
@@ -185,32 +189,50 @@ def plan_runs(
         hours,
         limits,
         noise,
-        tuple(planned),
-        (*on.assumed, *assumed, _EXACT),
-        _rehearsed(twin, noise, planned, columns, seed, progress) if rehearsed else (),
+        family.lab,
+        on.acting,
+        tuple(runs_planned),
+        (*on.assumed, *assumed, *_known(twin, goal), _EXACT),
+        _rehearsed(on, runs_planned, seed, progress) if rehearsed else (),
     )
 
 
+def _noise_of(twin: Twin) -> NoiseModel:
+    if not twin.noise.N:
+        raise InputError(
+            f"twin {twin.name} has no white noise, and without any no error can be expected; state 'N' "
+            "[deg/sqrt(h)] under its 'noise'"
+        )
+    return NoiseModel(twin.noise.N, twin.noise.B, twin.noise.K)
+
+
+def _known(twin: Twin, goal: _Goal) -> list[str]:
+    """That effects of the twin are taken as known, where there are some that nothing is asked of."""
+    asked = {one.id for one in goal.of.effects} if goal.of else set()
+    asked |= {member.value.id for group in goal.groups for member in group}
+    known = [
+        declared.id for declared, _ in twin.on if declared.id not in asked and not declared.drawn_per_run
+    ]
+    if not known:
+        return []
+    return [f"what twin {twin.name} has of {listed(known)} is taken as known exactly"]
+
+
 def _rehearsed(
-    twin: Twin,
-    noise: NoiseModel,
+    on: Stage,
     planned: Sequence[PlannedRun],
-    columns: Sequence[str] | None,
     seed: int,
     progress: Callable[[str], None] | None,
 ) -> tuple[Rehearsed, ...]:
     """What a diagnosis of the planned runs, their sensors as the twin's, would name of each candidate."""
     if progress is not None:
         progress("rehearsing each candidate")
-    quiet = replace(twin, noise=NoiseConstants())
+    told = [(p.programme, p.facts, seed + i) for i, p in enumerate(planned)]
     runs = [
-        quiet.simulate(
-            p.programme, sample_s=FINE_S, facts=p.facts, columns=None if columns is None else tuple(columns),
-            seed=seed + i,
-        ).run
-        for i, p in enumerate(planned)
-    ]  # fmt: skip
-    return rehearse(foreseen(TwinModel(quiet), runs, noise, STANDARD))
+        on.acting.simulate(steps, sample_s=FINE_S, facts=facts, columns=on.columns, seed=own).run
+        for steps, facts, own in told
+    ]
+    return rehearse(foreseen(TwinModel(on.acting), runs, on.noise, STANDARD))
 
 
 def _next_run(
@@ -236,13 +258,13 @@ def _next_run(
     best = finals[0].design
     rehearsal = Rehearsal(on, family, best, FINE_S)
     return PlannedRun(
-        family.programme(best, name),
+        planned(on, family, best, name),
         family.in_words(best),
         mounted(on.facts, best),
         goal.outlook(Together([*earlier, rehearsal])),
         tuple(
             (
-                family.programme(one.design, f"{name}-alternative-{i}"),
+                planned(on, family, one.design, f"{name}-alternative-{i}"),
                 family.in_words(one.design),
                 goal.outlook(together(one.design, FINE_S)),
             )

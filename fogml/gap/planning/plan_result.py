@@ -10,6 +10,7 @@ import numpy as np
 
 from fogml.arrays import FloatArray
 from fogml.gap.planning.fisher import Criterion
+from fogml.gap.planning.lab import Lab
 from fogml.gap.planning.rehearsal import COARSE_S, FINE_S, Rehearsal
 from fogml.gap.planning.separating import LEAST_DISTANCE, least_of
 from fogml.gap.result_parts import Rehearsed
@@ -17,6 +18,7 @@ from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.programme import Programme
 from fogml.twin.schedule import Track
+from fogml.twin.twin import Twin
 
 _BETTER = 0.9
 
@@ -133,6 +135,10 @@ class Plan:
         Lowest and highest temperature [degC].
     noise
         Of the gyro.
+    lab
+        What chamber, table and fixture can do.
+    acting
+        The twin that was planned with, without noise: with the heat that was assumed where it states none.
     runs
         In order; the last one's outlook is the plan's.
     assumed
@@ -147,6 +153,8 @@ class Plan:
     hours: float
     limits: tuple[float, float]
     noise: NoiseModel
+    lab: Lab
+    acting: Twin
     runs: tuple[PlannedRun, ...]
     assumed: tuple[str, ...]
     rehearsal: tuple[Rehearsed, ...] = ()
@@ -182,6 +190,8 @@ def plan_values(plan: Plan) -> dict[str, Any]:
         "hours": plan.hours,
         "total_hours": sum(run.programme.total_hours for run in plan.runs),
         "limits_degC": list(plan.limits),
+        "fastest_ramp_degC_min": plan.lab.fastest_ramp,
+        "fastest_turn_deg_s": plan.lab.fastest_turn,
         "noise": {"N": plan.noise.N, "B": plan.noise.B, "K": plan.noise.K},
         "sample_s": {"search": COARSE_S, "figures": FINE_S},
         "least_distance": LEAST_DISTANCE,

@@ -8,36 +8,18 @@ soaks, a minor loop, turns of the table, power steps. `Family.programme` writes 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.gap.planning.lab import ROOM_DEGC, Lab
 from fogml.numerals import short
 from fogml.twin.programme import Programme
-from fogml.twin.steps import Action, Ramp, Setting, Soak, Step, Switched, Turn, duration_text
-
-ROOM_DEGC = 25.0
-LADDERS: Mapping[str, tuple[float, ...]] = {
-    "none": (),
-    "one rate": (10.0, -10.0),
-    "rates": (0.01, -0.01, 1.0, -1.0, 10.0, -10.0, 100.0, -100.0),
-    "slow rates": (-0.001, 0.001, -0.002, 0.002, -0.0025, 0.0025, -0.003, 0.003, -0.005, 0.005),
-}
-"""Table rates [deg/s] of a ladder; the slow ones go through zero beside the Earth's rate."""
-RATE_S = 120.0
-"""Time at each table rate [s]."""
-POWER_OFF_S, WARM_UP_S, TURN_AFTER_ON_S = 1200.0, 2400.0, 300.0
-SWITCHED_S: Mapping[Switched, tuple[float, float]] = {"fan": (1200.0, 1200.0), "compressor": (900.0, 300.0)}
-"""How long each is off, and on again [s]."""
-YAW_S = 900.0
-MINOR_SHARE = 0.2
-"""Half-width of the minor loop as a share of the span between the limits."""
-RAMP_RATES = (0.25, 0.5, 1.0, 2.0)
-SOAKS_S = (1800.0, 2700.0, 3600.0, 5400.0, 7200.0, 10800.0, 14400.0, 21600.0)
+from fogml.twin.steps import Action, Ramp, Setting, Soak, Step, Turn, duration_text
 
 Mounting = Literal["up", "down", "north", "south", "east", "west"]
 
@@ -62,7 +44,7 @@ class Design:
     minor_loop
         Whether a loop within the large one follows.
     ladder
-        Table rates in each soak, a key of `LADDERS`.
+        Table rates in each soak, a key of the lab's `ladders`.
     power_steps
         Where the power goes off for a while: nowhere, in the first soak, or in each.
     cold_start
@@ -109,33 +91,33 @@ class Design:
         return sum((*chosen, self.minor_loop, self.cold_start, self.fan_off, self.compressor_off, self.yaw))
 
 
-def leg(start: float, end: float, rate: float, design: Design) -> list[Step]:
+def leg(start: float, end: float, rate: float, design: Design, lab: Lab) -> list[Step]:
     """Ramps from one temperature to another with soaks on the way and at the end."""
     steps: list[Step] = []
     at = start
     for number in range(1, design.stops + 2):
         goal = float(round(start + (end - start) * number / (design.stops + 1)))
         if goal != at:
-            steps += [Ramp(goal, rate), soak(goal, design)]
+            steps += [Ramp(goal, rate), soak(goal, design, lab)]
             at = goal
     return steps
 
 
-def soak(temperature: float, design: Design, opening: bool = False) -> Soak:
+def soak(temperature: float, design: Design, lab: Lab, opening: bool = False) -> Soak:
     """A soak: rest first, then one thing after another."""
     actions: list[Action] = []
-    ladder = LADDERS[design.ladder]
-    turn_s = RATE_S * len(ladder)
+    ladder = lab.ladders[design.ladder]
+    turn_s = lab.turn_s * len(ladder)
     at = design.soak_s
 
     def turn(start_s: float) -> None:
         if ladder:
-            actions.append(Turn(tuple((rate, RATE_S) for rate in ladder), start_s))
+            actions.append(Turn(tuple((rate, lab.turn_s) for rate in ladder), start_s))
 
     if opening and design.cold_start:
         actions.append(Setting("power", 1.0))
-        at = max(at, WARM_UP_S + turn_s)
-        turn(TURN_AFTER_ON_S)
+        at = max(at, lab.warm_up_s + turn_s)
+        turn(lab.turn_after_on_s)
     if ladder:
         turn(at)
         at += turn_s
@@ -143,16 +125,18 @@ def soak(temperature: float, design: Design, opening: bool = False) -> Soak:
         angles = (180.0,) if design.mounting in ("up", "down", None) else (90.0, 180.0, 270.0)
         for angle in (*angles, 0.0):
             actions.append(Setting("yaw", angle, at))
-            at += YAW_S
+            at += lab.yaw_s
     if design.power_steps == "each" or (opening and design.power_steps == "first"):
-        actions.append(Setting("power", 0.0, at, POWER_OFF_S))
-        at += POWER_OFF_S
-        turn(at + TURN_AFTER_ON_S)
-        at += WARM_UP_S + turn_s
-    for name, (off_s, on_s) in SWITCHED_S.items():
-        if getattr(design, f"{name}_off"):
-            actions.append(Setting(name, 0.0, at, off_s))
-            at += off_s + on_s
+        actions.append(Setting("power", 0.0, at, lab.power_off_s))
+        at += lab.power_off_s
+        turn(at + lab.turn_after_on_s)
+        at += lab.warm_up_s + turn_s
+    if design.fan_off:
+        actions.append(Setting("fan", 0.0, at, lab.fan_off_s))
+        at += lab.fan_off_s + lab.fan_on_s
+    if design.compressor_off:
+        actions.append(Setting("compressor", 0.0, at, lab.compressor_off_s))
+        at += lab.compressor_off_s + lab.compressor_on_s
     return Soak(temperature, at, tuple(actions))
 
 
@@ -170,6 +154,8 @@ class Family:
         Where the input axis may point.
     power_steps
         Whether the power may be switched.
+    lab
+        What it can do beside, and how long that takes.
 
     Raises
     ------
@@ -181,6 +167,7 @@ class Family:
     limits: tuple[float, float] = (-40.0, 60.0)
     mountings: tuple[Mounting | None, ...] = ("up",)
     power_steps: bool = True
+    lab: Lab = field(default_factory=Lab)
 
     def __post_init__(self) -> None:
         low, high = self.limits
@@ -198,23 +185,25 @@ class Family:
 
     def shortest(self) -> Design:
         """One cycle at the fastest rate with the shortest soaks."""
-        return Design(rates=(RAMP_RATES[-1], None, None), soak_s=SOAKS_S[0], mounting=self.mountings[0])
+        fastest, shortest = self.lab.ramp_rates[-1], min(self.lab.soaks_s)
+        return Design(rates=(fastest, None, None), soak_s=shortest, mounting=self.mountings[0])
 
     def starts(self) -> tuple[Design, ...]:
         """Designs that a search begins from, each within the hours."""
-        mounting = self.mountings[0]
+        mounting, ladders = self.mountings[0], self.lab.ladders
+        eighth, quarter, half, whole = self.lab.ramp_rates
         everything = Design(
-            rates=(0.5, 2.0, None),
-            ladder="rates",
+            rates=(quarter, whole, None),
+            ladder="rates" if "rates" in ladders else "none",
             minor_loop=True,
             power_steps="first" if self.power_steps else "none",
-            fan_off=True,
+            fan_off=self.lab.fan_steps,
             mounting=mounting,
         )
-        slow = Design(rates=(0.25, None, None), soak_s=7200.0, stops=1, mounting=mounting)
+        slow = Design(rates=(eighth, None, None), soak_s=7200.0, stops=1, mounting=mounting)
         switched = Design(
-            rates=(1.0, None, None),
-            ladder="one rate",
+            rates=(half, None, None),
+            ladder="one rate" if "one rate" in ladders else "none",
             power_steps="each" if self.power_steps else "none",
             cold_start=self.power_steps,
             mounting=mounting,
@@ -227,24 +216,26 @@ class Family:
 
         In random order where `rng` is given. Each is worked out when its turn comes.
         """
+        lab = self.lab
         changes: list[dict[str, Any]] = [
             {"rates": (*design.rates[:place], rate, *design.rates[place + 1 :])}
             for place in range(3)
-            for rate in (None, *RAMP_RATES)
+            for rate in (None, *lab.ramp_rates)
         ]
         choices: dict[str, Iterable[Any]] = {
             "cold_share": (0.25, 0.5, 1.0),
             "hot_share": (0.25, 0.5, 1.0),
             "first": ("cold", "hot"),
-            "soak_s": SOAKS_S,
+            "soak_s": lab.soaks_s,
             "stops": (0, 1, 3),
-            "ladder": LADDERS,
+            "ladder": lab.ladders,
         }
-        switches = ["minor_loop", "fan_off", "compressor_off", "yaw"]
+        may = {"minor_loop": True, "fan_off": lab.fan_steps, "compressor_off": lab.compressor_steps}
+        may |= {"yaw": lab.yaw, "cold_start": self.power_steps}
         if self.power_steps:
             choices["power_steps"] = ("none", "first", "each")
-            switches.append("cold_start")
-        choices |= dict.fromkeys(switches, (False, True)) | {"mounting": self.mountings}
+        choices |= {name: (False, True) for name, allowed in may.items() if allowed}
+        choices["mounting"] = self.mountings
         changes += [{name: value} for name, values in choices.items() for value in values]
         told: set[Design | None] = {None, design}
         for place in range(len(changes)) if rng is None else rng.permutation(len(changes)):
@@ -257,9 +248,9 @@ class Family:
         """The design with shorter soaks, then without its later cycles, until it fits; None if it can't."""
         # Designs that come to the same are written out once, as plain ones.
         while self.programme(design := design.plain()).total_hours > self.hours:
-            shorter = [soak for soak in SOAKS_S if soak < design.soak_s]
+            shorter = [soak for soak in self.lab.soaks_s if soak < design.soak_s]
             if shorter:
-                design = replace(design, soak_s=shorter[-1])
+                design = replace(design, soak_s=max(shorter))
             elif design.stops:
                 design = replace(design, stops=0)
             elif len(design.cycles) > 1:
@@ -292,10 +283,12 @@ class Family:
             words.append("at room temperature" + (" but for a minor loop" if design.minor_loop else ""))
         words.append(f"soaks of {duration_text(design.soak_s)}")
         which = "the first" if design.power_steps == "first" else "each"
+        speeds = sorted({abs(rate) for rate in self.lab.ladders[design.ladder]})
+        turns = " to ".join(f"{rate:g}" for rate in dict.fromkeys((*speeds[:1], *speeds[-1:])))
         told = (
             (design.stops and design.cycles, f"{design.stops} more on each leg"),
             (design.minor_loop and design.cycles, "a minor loop"),
-            (design.ladder != "none", f"turns at {design.ladder} in each soak"),
+            (design.ladder != "none", f"turns at {turns} deg/s in each soak"),
             (design.power_steps != "none", f"power off and on in {which} soak"),
             (design.cold_start, "switched on at the beginning"),
             (design.fan_off, "fan off in each soak"),
@@ -310,20 +303,25 @@ class Family:
 def _written(family: Family, design: Design) -> Programme:
     """The steps of a design; a search asks for the same ones several times."""
     cold, hot = family.temperatures(design)
+    lab = family.lab
     ends = (cold, hot) if design.first == "cold" else (hot, cold)
-    steps: list[Step] = [soak(ROOM_DEGC, design, opening=True)]
-    at, rate = ROOM_DEGC, RAMP_RATES[-2]
+    steps: list[Step] = [soak(ROOM_DEGC, design, lab, opening=True)]
+    at, rate = ROOM_DEGC, lab.ramp_rates[-2]
     for rate in design.cycles:
         for end in ends:
-            steps += leg(at, end, rate, design)
+            steps += leg(at, end, rate, design, lab)
             at = end
     if design.minor_loop:
-        middle, reach = round(0.5 * (cold + hot)), round(MINOR_SHARE * (hot - cold))
+        middle, reach = round(0.5 * (cold + hot)), round(lab.minor_share * (hot - cold))
         for turning in (middle, middle - reach, middle + reach):
-            steps += leg(at, float(turning), RAMP_RATES[-2], replace(design, stops=0))
+            steps += leg(at, float(turning), lab.ramp_rates[-2], replace(design, stops=0), lab)
             at = float(turning)
     if at != ROOM_DEGC:
-        steps += [Ramp(ROOM_DEGC, rate), soak(ROOM_DEGC, design)]
+        steps += [Ramp(ROOM_DEGC, rate), soak(ROOM_DEGC, design, lab)]
     return Programme(
-        steps, name="planned", description=family.in_words(design), powered=not design.cold_start
+        steps,
+        name="planned",
+        description=family.in_words(design),
+        fastest_rate=lab.fastest_ramp,
+        powered=not design.cold_start,
     )

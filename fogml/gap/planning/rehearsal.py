@@ -27,6 +27,7 @@ from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.plant.heat import SelfHeating
+from fogml.twin.programme import Programme
 from fogml.twin.registry import effect
 from fogml.twin.set_up import Sensors
 from fogml.twin.simulate import DEFAULT_FACTS
@@ -50,8 +51,8 @@ class Stage:
     ----------
     model
         The twin with exact sensors, as a model that can be diagnosed.
-    sensors
-        Those that it has, whose noise tells how much rows weigh.
+    acting
+        What a planned run would be of: the twin with its sensors and the heat that is assumed, without noise.
     noise
         Of the gyro.
     values
@@ -65,7 +66,7 @@ class Stage:
     """
 
     model: TwinModel
-    sensors: Sensors
+    acting: Twin
     noise: NoiseModel
     values: Mapping[str, float]
     facts: Facts
@@ -95,9 +96,10 @@ def stage(
         assumed.append(
             f"the electronics turn {watts:g} W into heat while on; twin {twin.name} states no heat of its own"
         )
+    acting = replace(twin, plant=plant, noise=NoiseConstants())
     return Stage(
-        TwinModel(replace(twin, plant=plant, sensors=Sensors(), noise=NoiseConstants())),
-        twin.sensors,
+        TwinModel(replace(acting, sensors=Sensors())),
+        acting,
         noise,
         dict(values),
         DEFAULT_FACTS if facts is None else facts,
@@ -162,12 +164,12 @@ class Rehearsal(ExpectedRuns):
         self.rows = rows = rows_of(run, model.twin, round(run.span_s / sample_s) + 1, exact=True)
         self._values = on.values
         self._whitener = whitener_of(on.noise, rows)
-        reading = _reading_noise(rows, on.sensors, on.values)
+        reading = _reading_noise(rows, on.acting.sensors, on.values)
         self._weights = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
         scene = Scene((rows,), 1, on.model.grade, constants=on.values)
         setting = Setting(scene, model.constants, STANDARD, ())
         # How late the unit's sensors are is as little known to a fit of the run as it is to a diagnosis.
-        fixed = fixed_columns(setting, 0, replace(model.twin, sensors=on.sensors))
+        fixed = fixed_columns(setting, 0, on.acting)
         white, count = self._whiten(fixed), len(model.constants)
         super().__init__(on, white[:, :count], white[:, count:])
 
@@ -210,6 +212,11 @@ def _reading_noise(rows: Rows, sensors: Sensors, values: Mapping[str, float]) ->
 def mounted(facts: Facts, design: Design) -> Facts:
     """The facts with the design's mounting, where it states one."""
     return facts.model_copy(update={"input_axis": design.mounting or facts.input_axis})
+
+
+def planned(on: Stage, family: Family, design: Design, name: str) -> Programme:
+    """The programme of a design with the mounting that is planned with, which `fogml simulate` then takes."""
+    return replace(family.programme(design, name), input_axis=mounted(on.facts, design).input_axis)
 
 
 def rehearse(

@@ -11,7 +11,7 @@ It is what the square root of twice the gain in log likelihood of a over b would
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import permutations
@@ -22,18 +22,15 @@ import numpy as np
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.gap.model import EffectValue
-from fogml.gap.planning.programme_family import Family, Mounting
+from fogml.gap.planning.programme_family import Family
 from fogml.gap.planning.programme_search import MOST_RUNS, Tried, finely, search
-from fogml.gap.planning.rehearsal import FINE_S, ExpectedRuns, Rehearsal, Stage, stage
+from fogml.gap.planning.rehearsal import FINE_S, ExpectedRuns, Rehearsal, Stage, planned
 from fogml.gap.result import SeparatingRun
 from fogml.gap.rows import at_amplitude
 from fogml.gap.shapes import GridNode, grid
-from fogml.runs.facts import Facts
-from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Quantity
 from fogml.twin.registry import effect
-from fogml.twin.twin import Twin
 
 LEAST_DISTANCE = 3.0
 """Effects less far apart are not told from each other, and one less long does not show."""
@@ -54,47 +51,30 @@ class Member:
 
 
 def separating_run(
-    twin: Twin,
-    noise: NoiseModel,
-    constants: Mapping[str, float],
+    on: Stage,
+    family: Family,
     members: Sequence[EffectValue],
     *,
-    hours: float = 24.0,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
-    limits: tuple[float, float] = (-40.0, 60.0),
-    facts: Facts | None = None,
-    columns: Sequence[str] | None = None,
-    power_steps: bool = True,
     most: int = MOST_RUNS,
 ) -> SeparatingRun | None:
     """The programme that pulls effects furthest apart, or shows a single one best.
 
     Parameters
     ----------
-    twin
-        The twin, whose plant and noise the run would have.
-    noise
-        Noise of the gyro.
-    constants
-        Nominal constants at which effects that act on inputs are taken.
+    on
+        The twin, whose plant and noise the run would have, at the constants where effects that act on inputs
+        are taken.
+    family
+        What the lab can do, and for how long.
     members
         The effects, each with its size and shape. Of a single one the distance is its whitened length beside
         the constants.
-    hours
-        Longest time of the programme [h].
     seed
         Of the search.
     progress
         Told what is being done.
-    limits
-        Lowest and highest temperature [degC].
-    facts
-        Of the set-up, whose mounting then holds; if None the input axis may point up or north.
-    columns
-        What the run records; what `fogml simulate` does if None.
-    power_steps
-        Whether the power may be switched.
     most
         Programmes that are tried at most.
 
@@ -107,11 +87,8 @@ def separating_run(
     Raises
     ------
     InputError
-        If no effect is given, one is named twice or unknown, or the hours are too few.
+        If no effect is given, or one is named twice or unknown.
     """
-    on = stage(twin, noise, constants, facts=facts, columns=columns)
-    mountings: tuple[Mounting | None, ...] = ("up", "north") if facts is None else (None,)
-    family = Family(hours, limits, mountings, power_steps)
     told = members_of(on, family, members)
     tried = search(
         family,
@@ -126,14 +103,14 @@ def separating_run(
     distance = math.exp(finals[0].merit)
     if distance < LEAST_DISTANCE:
         return None
-    return run_of(family, finals, [m.value.id for m in told], distance, "separating-run")
+    return run_of(on, family, finals, [m.value.id for m in told], distance, "separating-run")
 
 
 def run_of(
-    family: Family, finals: Sequence[Tried], ids: Sequence[str], distance: float, name: str
+    on: Stage, family: Family, finals: Sequence[Tried], ids: Sequence[str], distance: float, name: str
 ) -> SeparatingRun:
     """The best of the designs that a search ended with as a programme, the others as alternatives."""
-    programme = family.programme(finals[0].design, name=name)
+    programme = planned(on, family, finals[0].design, name)
     return SeparatingRun(
         separates=tuple(ids),
         programme=programme.as_yaml(),
@@ -144,7 +121,7 @@ def run_of(
             {
                 "summary": family.in_words(one.design),
                 "hours": one.hours,
-                "programme": family.programme(one.design, name="alternative").as_yaml(),
+                "programme": planned(on, family, one.design, "alternative").as_yaml(),
                 "distance": math.exp(one.merit),
             }
             for one in finals[1:]
