@@ -186,7 +186,7 @@ def _print_monitor(values: dict[str, Any], terminal: Terminal) -> None:
         )
     terminal.table(
         f"Units in service; alarm at {stated(limit)}",
-        ["unit", "runs", "last level [deg/h]", "evidence", "state"],
+        ["unit", "runs", "last bias [deg/h]", "evidence", "state"],
         rows,
     )
     for unit in shown:
