@@ -44,22 +44,28 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     for first in begun:
         note_wrong(first.name, check_run(first), terminal)
     model = open_model(settings.model, terminal)
+    notes = [note for first in begun for note in model.check_applies(first, settings.any_unit)]
+    for note in notes:
+        terminal.note(note)
     total = _expected_rows(settings.run)
     with (
         settings.written_beside(out, "compensate"),
         terminal.work(f"compensating {settings.run}", total=total) as work,
     ):
-        counts, still = _compensate(model, chain(begun, blocks), out, settings.any_unit, work)
+        counts, still = _compensate(model, chain(begun, blocks), out, notes, work)
     if still is not None:
         terminal.note(f"{Path(settings.run).name}: {dead_words(still)}")
     memories = [atom.text for atom in model.features_.atoms if atom.settles] if model.features_ else []
-    _print_compensated(settings, model.describe()["kind"], memories, counts, terminal)
+    _print_compensated(settings, model.describe()["kind"], memories, counts, notes, terminal)
 
 
 def _compensate(
-    model: DriftModel, blocks: Iterable[Run], out: Path, any_unit: bool, work: Work
+    model: DriftModel, blocks: Iterable[Run], out: Path, notes: Sequence[str], work: Work
 ) -> tuple[IntArray, float | None]:
-    """Write the compensated run; how many samples got each flag, shape (3,), and an output's only value."""
+    """Write the compensated run; how many samples got each flag, shape (3,), and an output's only value.
+
+    Whether the model applies is known, and in `notes`, which go to the run's own.
+    """
     from fogml.models.compensation import compensate_blocks
     from fogml.runs.writing import BlockWriter, carried_cells, header_cells
 
@@ -67,9 +73,13 @@ def _compensate(
     low, high = np.inf, -np.inf
     written: Future[None] | None = None
     with ExitStack() as stack:
-        for block, compensation in compensate_blocks(model, blocks, any_unit=any_unit):
+        for block, compensation in compensate_blocks(model, blocks, any_unit=True):
             if written is None:
-                writer = stack.enter_context(BlockWriter(out, block.facts))
+                facts = block.facts
+                if notes:
+                    told = "; ".join((*([facts.notes] if facts.notes else []), *notes))
+                    facts = facts.model_copy(update={"notes": told})
+                writer = stack.enter_context(BlockWriter(out, facts))
                 # Compressing takes as long as the rest: a block is written beside the next one's work.
                 beside = stack.enter_context(ThreadPoolExecutor(max_workers=1))
             else:
@@ -92,6 +102,7 @@ def _print_compensated(
     kind: str,
     memories: list[str],
     counts: IntArray,
+    notes: list[str],
     terminal: Terminal,
 ) -> None:
     assert settings.run and settings.out
@@ -103,6 +114,7 @@ def _print_compensated(
         "model": kind,
         "rows": rows,
         "flags": {name: int(count) for name, count in zip(FLAGS, counts, strict=True)},
+        "notes": notes,
     }
     terminal.table(
         f"{values['run']} compensated by {kind}, written to {settings.out}",

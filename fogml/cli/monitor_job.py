@@ -121,8 +121,10 @@ def _record(
 ) -> RunRecord:
     run = open_run(path, repair=settings.repair)
     note_wrong(run.name, run.findings, terminal)
-    averaging_s, any_unit = settings.averaging, settings.any_unit
-    return record_run(model_of(run), run, averaging_s=averaging_s, any_unit=any_unit)
+    model, any_unit = model_of(run), settings.any_unit
+    for told in model.check_applies(run, any_unit) if any_unit else ():
+        terminal.note(told)
+    return record_run(model, run, averaging_s=settings.averaging, any_unit=any_unit)
 
 
 def _models(place: Path, terminal: Terminal) -> Callable[[Run], DriftModel]:

@@ -80,8 +80,18 @@ def test_another_unit_is_refused_unless_allowed(invoke, model, run_files, tmp_pa
     assert "FOG-2" in result.stderr
     assert "--any-unit" in result.stderr
     assert not list(tmp_path.glob("out*"))
-    invoke("compensate", run_files[1], "--model", model, "-o", out, "--any-unit")
-    assert out.exists()
+    told = invoke("compensate", run_files[1], "--model", model, "-o", out, "--any-unit").stderr
+    assert "unit 'FOG-2', but the model was trained on unit" in told
+    notes = yaml.safe_load(out.with_suffix(".yaml").read_text())["notes"]
+    assert "unit 'FOG-2', but the model was trained on unit" in notes
+
+
+def test_earth_rate_that_the_model_holds_is_told(invoke, model, run_files, tmp_path):
+    run_files[1].with_suffix(".yaml").write_text("unit: FOG-1\naxis: x\nlatitude: 39.9\ninput_axis: down\n")
+    out = tmp_path / "out.csv"
+    told = invoke("compensate", run_files[1], "--model", model, "-o", out).stderr
+    assert "the model's drift holds the Earth rate of the training attitude" in told
+    assert "Earth rate" in yaml.safe_load(out.with_suffix(".yaml").read_text())["notes"]
 
 
 @pytest.mark.parametrize("name", ["model.json", "weights.safetensors"])
