@@ -22,6 +22,7 @@ from fogml.runs.run import Run
 from fogml.runs.turning import turning
 from fogml.signals.averages import AVERAGING_S, block_averages
 from fogml.validation.advice import Asked
+from fogml.validation.floors import check_noise_run
 from fogml.validation.judge import judge_run
 from fogml.validation.results import RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors
@@ -58,7 +59,8 @@ def acceptance_json(
     turn_on_band
         Band about the settled bias that tells the turn-on time [deg/h].
     noise
-        A static run for the noise terms; by default the longest of `runs` whose temperature is constant.
+        A static run for the noise terms; by default the longest of `runs` whose temperature is constant. Of
+        one whose temperature moves, K and R are not told.
     date
         Date of issue.
 
@@ -72,10 +74,12 @@ def acceptance_json(
     Raises
     ------
     InputError
-        For runs of several units or axes, or of another than the model's.
+        For runs of several units or axes, or of another than the model's, and a noise run that turns.
     """
     limits = limits or Limits()
     _check_one_gyro(runs)
+    if noise is not None:
+        check_noise_run(noise)
     (runs,) = named_apart(runs)
     errors = [_errors(run, model) for run in runs]
     brief = {one.run.name for one in errors if not _rests(one, averaging_s)}

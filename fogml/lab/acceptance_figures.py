@@ -288,10 +288,12 @@ def _of_rates(before: Sequence[Run], after: Sequence[Run]) -> Iterator[tuple[str
 def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) -> Iterator[tuple[str, Figure]]:
     """Noise terms of a static run: that which is named, else the longest at constant temperature.
 
-    A term that the run does not tell from the others stands with the upper end of its interval.
+    Of one that is named and warms up those that are told all the same. A term that the run does not tell from
+    the others stands with the upper end of its interval.
     """
     pairs = [(noise, noise)] if noise is not None else list(zip(before, after, strict=True))
-    static = [pair for pair in pairs if not pair[0].rate.any() and not moving_temperatures(pair[0])]
+    named = noise is not None
+    static = [one for one in pairs if not one[0].rate.any() and (named or not moving_temperatures(one[0]))]
     if not static:
         return
     pair = max(static, key=lambda one: (one[0].span_s, one[0].hash))

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError, known_are, quoted
+from fogml.runs.noise_of_run import MOVING_DEGC
 from fogml.yaml_text import read_yaml
 
 ANNEX_C = "annex C"
@@ -67,7 +68,7 @@ _SOAKS = "soaks at temperatures 5 degC apart or more"
 _BOTH_WAYS = "soaks at one temperature, on the way up and on the way down"
 _TURNS_IN_SOAKS = "turns of a rate table in soaks 5 degC apart or more"
 _CYCLES = "six runs or more of the unit"
-_STATIC = "a run long enough, at constant temperature"
+_STATIC = f"a run long enough, whose temperatures stay within {MOVING_DEGC:g} degC"
 _SMALL = "small rates of both senses about zero, Earth rate turned away"
 _STEPS = "small steps of the rate on top of a larger one"
 _POWER_ON = "a stated power-on (powered_on) and a band (--turn-on-band)"

@@ -207,8 +207,8 @@ def check_unit_and_axis(card: TrainingCard, run: Run, any_unit: bool) -> tuple[s
             difference = f"{run.name}: {fact} '{found}', but the model was trained on {fact} '{trained}'"
             if not any_unit:
                 raise InputError(
-                    f"{difference}; use a model of this {fact}, or apply it nevertheless (--any-unit, where the "
-                    "command takes that)"
+                    f"{difference}; use a model of this {fact}, or apply it nevertheless (--any-unit, where "
+                    "the command takes that)"
                 )
             notes.append(f"{difference}: applied because any unit was allowed")
     if run.earth_known and not card.earth_known:

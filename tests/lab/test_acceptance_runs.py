@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
 from fogml.lab.acceptance import acceptance_json
 from fogml.lab.acceptance_rows import Limit, Limits
 from fogml.lab.rate_json import rate_json
@@ -242,6 +243,20 @@ def test_noise_terms_are_those_of_the_static_run_alone(cycle, monkeypatch):
     still = table_run("still", [0.0], [0.0], stay=2000, facts=UP)
     assert row(acceptance_json([cycle, still]), "angle_random_walk")["of"] == "still"
     assert set(fitted) == {"still"}
+
+
+def test_a_noise_run_that_warms_up_tells_what_noise_tells_of_it(cycle):
+    """It was left out without a word: N was "not tested" of a run that was named for it."""
+    time = np.arange(4000.0)
+    T = 25.0 + 3.0 * (1.0 - np.exp(-time / 900.0))
+    gyro = EARTH + 0.05 * T + 0.6 * np.random.default_rng(5).standard_normal(4000)
+    warm = Run.from_columns("warm", UP, time=time, gyro=gyro, T=T)
+    values = acceptance_json([cycle], noise=warm)
+    assert row(values, "angle_random_walk")["before"] == pytest.approx(0.6 / 60.0, rel=0.05)
+    for key in ("rate_random_walk", "rate_ramp"):
+        assert "0.5 degC" in row(values, key)["remark"] and not row(values, key)["tested"]
+    with pytest.raises(InputError, match="a noise run is a static one"):
+        acceptance_json([cycle], noise=cycle)
 
 
 def test_an_output_at_the_ends_of_its_range_is_not_accepted(cycle, limits):
