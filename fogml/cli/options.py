@@ -107,7 +107,11 @@ Parameters = Annotated[
 ]
 Averaging = Annotated[float, Field(gt=0.0), option("Averaging time of the figures.", metavar="SECONDS")]
 Strict = Annotated[
-    bool, option("Make warnings on the runs' temperatures and rates errors.", "--strict/--no-strict")
+    bool,
+    option(
+        "Make errors of a small span of temperature, samples outside training, a test run trained on.",
+        "--strict/--no-strict",
+    ),
 ]
 AnyUnit = Annotated[
     bool, option("Allow a run of another unit or axis than the model's.", "--any-unit/--same-unit")
