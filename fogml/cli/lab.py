@@ -162,7 +162,8 @@ class AcceptanceSettings(Settings):
 
     From runs of one unit and axis: static, over temperature, on a rate table. Figures are before and after
     compensation where a model is named. With --out, writes acceptance.json, acceptance.html,
-    acceptance.xlsx and lab-acceptance.config.yaml. Exit status 1 if a limit is missed or not tested.
+    acceptance.xlsx and lab-acceptance.config.yaml. Exit status 1 if limits are stated and the unit is not
+    accepted.
     """
 
     job: ClassVar[str] = "fogml.cli.lab_jobs:acceptance_and_write"
