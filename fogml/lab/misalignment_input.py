@@ -83,7 +83,7 @@ def _cells(table: RawTable) -> dict[str, str]:
         held = ", ".join(f"'{name}'" for name in list(cells)[:20])
         raise InputError(
             f"{table.file}: no column {', '.join(repr(name) for name in missing)}; the procedure needs "
-            f"'state', 'tilt [deg]', 'rate [deg/s]', 'segment' and 'output' with its unit; "
+            f"'state', 'tilt [deg]', 'rate [deg/s]', 'output' with its unit, and 'segment' or 'time'; "
             f"the header holds {held}"
         )
     return cells
