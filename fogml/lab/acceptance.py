@@ -19,10 +19,9 @@ from fogml.models.table import usable_rows
 from fogml.runs.findings import IMPLAUSIBLE, SATURATION
 from fogml.runs.names import named_apart
 from fogml.runs.run import Run
-from fogml.runs.turning import turning
+from fogml.runs.turning import check_noise_run, turning
 from fogml.signals.averages import AVERAGING_S, block_averages
 from fogml.validation.advice import Asked
-from fogml.validation.floors import check_noise_run
 from fogml.validation.judge import judge_run
 from fogml.validation.results import RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors

@@ -15,7 +15,7 @@ from fogml.lab.rate_pieces import earth_deg_h, find_plateaus, merged
 from fogml.numerals import number
 from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
-from fogml.runs.turning import least_rate_deg_s, white_noise
+from fogml.runs.turning import least_rate_deg_s, turning, white_noise
 from fogml.validation.certified import of_10_s, over_temperature
 from fogml.validation.metrics import SETTLED_SHARE, repeatability_of
 from fogml.validation.results import Repeatability, RunJudgement, SoakBias, SpreadOverRuns
@@ -285,15 +285,22 @@ def _of_rates(before: Sequence[Run], after: Sequence[Run]) -> Iterator[tuple[str
             yield key, Figure(was, now, names[key], remark, at_most=not over, at_least=not seen)
 
 
+def _static(before: Sequence[Run], after: Sequence[Run]) -> list[tuple[Run, Run]]:
+    """Runs that rest at constant temperature; a rate that is recorded of a table at rest is noise."""
+    return [
+        (run, left)
+        for run, left in zip(before, after, strict=True)
+        if not (turning(run).any() or small_rates(run) or moving_temperatures(run))
+    ]
+
+
 def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) -> Iterator[tuple[str, Figure]]:
     """Noise terms of a static run: that which is named, else the longest at constant temperature.
 
     Of one that is named and warms up those that are told all the same. A term that the run does not tell from
     the others stands with the upper end of its interval.
     """
-    pairs = [(noise, noise)] if noise is not None else list(zip(before, after, strict=True))
-    named = noise is not None
-    static = [one for one in pairs if not one[0].rate.any() and (named or not moving_temperatures(one[0]))]
+    static = [(noise, noise)] if noise is not None else _static(before, after)
     if not static:
         return
     pair = max(static, key=lambda one: (one[0].span_s, one[0].hash))

@@ -250,11 +250,14 @@ def test_a_noise_run_that_warms_up_tells_what_noise_tells_of_it(cycle):
     time = np.arange(4000.0)
     T = 25.0 + 3.0 * (1.0 - np.exp(-time / 900.0))
     gyro = EARTH + 0.05 * T + 0.6 * np.random.default_rng(5).standard_normal(4000)
-    warm = Run.from_columns("warm", UP, time=time, gyro=gyro, T=T)
+    rate = 1e-6 * np.random.default_rng(6).standard_normal(4000)  # as recorded of a table that rests
+    warm = Run.from_columns("warm", UP, time=time, gyro=gyro, T=T, rate=rate)
     values = acceptance_json([cycle], noise=warm)
     assert row(values, "angle_random_walk")["before"] == pytest.approx(0.6 / 60.0, rel=0.05)
     for key in ("rate_random_walk", "rate_ramp"):
         assert "0.5 degC" in row(values, key)["remark"] and not row(values, key)["tested"]
+    still = warm.with_columns(T=np.full(4000, 25.0))
+    assert row(acceptance_json([still]), "angle_random_walk")["tested"]
     with pytest.raises(InputError, match="a noise run is a static one"):
         acceptance_json([cycle], noise=cycle)
 
