@@ -11,7 +11,7 @@ import numpy as np
 from fogml.errors import quoted
 from fogml.escaping import visible
 from fogml.numerals import duration
-from fogml.runs.columns import column_spec, conversion, is_accepted
+from fogml.runs.columns import column_spec, conversion, converted, is_accepted
 from fogml.runs.draft_container import container_fields
 from fogml.runs.draft_layout import Field, as_yaml, text_layout
 from fogml.runs.draft_words import AXIS, COUNT, DATE, GYRO, MULTIPLE, NO_OUTPUT, OWN, SET_POINT, TIME, WARM
@@ -280,7 +280,10 @@ def _gyro(one: Field | None, many: bool) -> str:
     )
     text = f"{one.name} {one.unit or ''}".lower()
     unit = next((u for u, hint in hints if re.search(hint, text)), None)
-    if unit is None and len(values) and np.all(values == np.round(values)):
+    angle = one.unit or one.name.rpartition("_")[2]
+    if unit is None and (per := converted(angle, "deg")) is not None:
+        why = f"{angle} turned in a sample? Then 'scale: {per[0]:.9g}/DT', DT its interval in seconds"
+    elif unit is None and len(values) and np.all(values == np.round(values)):
         unit, why = "count", "whole numbers; with 'scale: 1/K' it may be deg/s or deg/h"
     else:
         why = f"the file says '{one.unit}': state a scale" if one.unit else "the file states no unit"

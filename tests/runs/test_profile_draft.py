@@ -239,6 +239,21 @@ def test_a_guess_of_the_gyros_unit_goes_by_what_the_cell_says(tmp_path, cell, fa
     np.testing.assert_allclose(run.gyro, factor * (np.arange(50) % 7 + 0.25), rtol=1e-12)
 
 
+@pytest.mark.parametrize("cell", ["dtheta [arcsec]", "dtheta_arcsec"])
+def test_angles_of_a_sample_become_a_rate_by_what_the_draft_says(tmp_path, cell) -> None:
+    """An arcsecond in a tenth of a second is 10 deg/h."""
+    path, profile = tmp_path / "log.csv", tmp_path / "profile.yaml"
+    path.write_text(
+        f"time [s],{cell},T [degC]\n" + "".join(f"{i / 10},{i % 7},{20 + i}\n" for i in range(50))
+    )
+    draft = draft_profile(path)
+    scale = re.search(r"arcsec turned in a sample\? Then '(scale: \S+)/DT'", draft)
+    assert scale is not None
+    profile.write_text(draft.replace("unit: deg/s}", f"unit: deg/s, {scale[1]}/0.1}}"))
+    (run,) = import_recording(path, profile)
+    np.testing.assert_allclose(run.gyro, 10.0 * (np.arange(50) % 7), rtol=1e-8)
+
+
 @pytest.mark.parametrize(
     ("head", "row", "told"),
     [
