@@ -196,7 +196,7 @@ def write_report(
     def make() -> dict[str, Any]:
         limits = None if settings.limits is None else read_limits(settings.limits)
         # Runs of three gyros are told by reading them, before one model is looked for.
-        runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
+        runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis, drift=False)
         model = model_of()
         check(runs)
         noise = open_noise(settings.noise, terminal, runs, repair=settings.repair, axis=settings.axis)

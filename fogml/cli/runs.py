@@ -136,8 +136,9 @@ def open_runs(
     repair: Repairing = False,
     axis: str | None = None,
     beside: Sequence[str] = (),
+    drift: bool = True,
 ) -> list[Run]:
-    """The runs in several files; findings are noted on stderr.
+    """The runs in several files; findings are noted on stderr, those of a `drift` model where one is made.
 
     Runs of files of one name, those `beside` among them, are told apart by their folders.
 
@@ -155,7 +156,7 @@ def open_runs(
             legs = open_legs(path, repair=repair, axis=axis)
             runs += [renamed(leg, folders[path] + leg.name) for leg in legs]
             work.advance()
-    note_findings(runs, terminal)
+    note_findings(runs, terminal, drift=drift)
     return runs
 
 
@@ -193,9 +194,10 @@ def open_noise(
     return run
 
 
-def note_findings(runs: Sequence[Run], terminal: Terminal) -> None:
+def note_findings(runs: Sequence[Run], terminal: Terminal, *, drift: bool = True) -> None:
     """Note on stderr what was noticed in runs, first what makes every figure wrong."""
-    noticed = [(run.name, finding) for run in runs for finding in run.findings]
+    told = [(run.name, run.findings if drift else beside_drift(run.findings)) for run in runs]
+    noticed = [(name, finding) for name, findings in told for finding in findings]
     for name, finding in sorted(noticed, key=lambda one: one[1].code not in FIRST_OF_ALL):
         terminal.note(f"{name}: {finding.message}")
 

@@ -259,7 +259,7 @@ def _verdict(
         return REJECTED, [*still, *missed, *lacking, *fitted]
     if still or lacking or fitted:
         return INCOMPLETE, [*still, *lacking, *fitted]
-    return ACCEPTED, [f"all {len(limited)} limits are met"]
+    return ACCEPTED, [f"all limits are met ({len(limited)})"]
 
 
 def _beyond(row: Mapping[str, Any]) -> str:

@@ -64,6 +64,14 @@ def test_a_noise_run_of_several_legs_is_refused_and_named(run_files, tmp_path: P
     assert "legs.csv" in told and "one run is needed here" in told
 
 
+def test_of_a_static_run_nothing_is_said_of_drift_models(tmp_path: Path, invoke) -> None:
+    still = tmp_path / "still.csv"
+    gyro = np.random.default_rng(1).normal(5.0, 0.1, 1000)
+    rows = [f"{i},{value:.6f},25.0" for i, value in enumerate(gyro)]
+    still.write_text("\n".join(["time [s],gyro [deg/h],T [degC]", *rows]))
+    assert "drift model" not in invoke("lab", "acceptance", still).stderr
+
+
 def test_misalignment(turns: Path, tmp_path: Path, invoke, invoke_json) -> None:
     told = invoke_json("lab", "misalignment", turns)
     assert told["schema"] == "fogml.misalignment/1" and set(MISALIGNMENT_KEYS) <= set(told)
