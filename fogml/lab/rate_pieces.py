@@ -89,7 +89,7 @@ def with_steady_earth(run: Run) -> Run:
     if "angle" not in run.columns or not run.earth_known:
         return run
     turning = run.reference_deg_h - 3600.0 * run.rate - earth_deg_h(run)
-    if not turning.any():
+    if not turning.any() or np.ptp(run.rate) == 0.0:
         return run
     rate = run.rate - run.rate.mean()
     slope = float(rate @ run.gyro_deg_h) / (3600.0 * float(rate @ rate))

@@ -7,8 +7,10 @@ import re
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
 from fogml.lab.rate_errors import greatest_within
 from fogml.lab.rate_json import rate_json
+from fogml.lab.rate_pieces import with_steady_earth
 from fogml.lab.rate_words import result_rows, verdict_sentences
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
@@ -150,3 +152,14 @@ def test_earth_rate_that_the_table_turns_about_is_no_bend_and_no_asymmetry(scale
     line = rate_json([Run("leaning", columns, facts)], source="a table")["scale_factor"]
     assert line["scale_factor"] == pytest.approx(scale, abs=3e-6)
     assert abs(line["asymmetry_ppm"]) < 5.0 and line["nonlinearity_ppm"] < 5.0
+
+
+@pytest.mark.parametrize("rate", [5.0, 0.1])
+def test_one_rate_alone_is_told_as_that_where_earth_rate_turns_with_the_table(rate) -> None:
+    """No slope over the rate is told by one rate, nor by what rounding leaves of its mean."""
+    time = np.arange(2000.0)
+    columns = {"time": time, "rate": 0.0 * time + rate, "angle": rate * time, "gyro": np.sin(time)}
+    run = Run("one rate", columns, Facts(latitude=40.0, input_axis="north"))
+    assert with_steady_earth(run) is run
+    with pytest.raises(InputError, match="has to stay at two rates"):
+        rate_json([run], source="one rate")
