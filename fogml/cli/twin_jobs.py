@@ -223,7 +223,7 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
     checked_suffix(out, IN_BLOCKS)
     with terminal.work(f"reading {settings.run}") as work:
         run = open_run(settings.run, repair=settings.repair)
-        note_findings([run], terminal)
+        note_findings([run], terminal, drift=False)
         truth = read_truth(settings.truth) if settings.truth else None
         work.doing("replaying")
         if twin is None:
