@@ -162,8 +162,8 @@ def test_what_a_direction_left_out_tells_counts_as_of_a_fit_to_both():
 @pytest.mark.parametrize("weights", [[0.5, 0.5], [0.2, 0.6], [1.0, 0.0]])
 def test_a_model_weighed_with_itself_is_as_uncertain_as_that_model(weights):
     rng = np.random.default_rng(2)
-    T = rng.normal(size=200)
-    one = LinearRegressor().fit(T[:, None], 2.0 * T + rng.normal(size=200))
-    _, both = combined([(Features("T"), one)] * 2, np.array(weights), 0.0)
+    columns = rng.normal(size=(200, 2)) * [1.0, 30.0]
+    one = LinearRegressor().fit(columns, 2.0 * columns[:, 0] + rng.normal(size=200))
+    _, both = combined([(Features("T, dT"), one)] * 2, np.array(weights), 0.0)
     np.testing.assert_allclose(both.standard_errors(), sum(weights) * one.standard_errors())
     np.testing.assert_allclose(both.covariance_, sum(weights) ** 2 * one.covariance_)

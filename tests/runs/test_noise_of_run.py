@@ -11,6 +11,7 @@ from fogml.errors import InputError
 from fogml.runs import noise_of_run
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.noise_of_run import noise_report
+from fogml.runs.noise_series import rows_at_rest, stretches_at_rest
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 from fogml.signals import noise_terms
@@ -120,6 +121,8 @@ def test_only_rows_at_rest_count_where_the_table_turns():
     report = noise_report(turning)
     assert [warning["code"] for warning in report["warnings"]] == ["turning"]
     assert report["stretches"] == 2
+    kept = np.concatenate([np.arange(20_000)[part] for part in stretches_at_rest(turning)])
+    np.testing.assert_array_equal(kept, np.flatnonzero(rows_at_rest(turning)))
     assert report["terms"]["N"]["value"] == pytest.approx(0.01, rel=0.05)
     assert "all through" in noise_report(still_run(rate=np.full(20_000, 10.0)))["warnings"][0]["message"]
 
