@@ -428,6 +428,19 @@ def test_waveforms_of_two_rates_in_one_group_of_tdms(tmp_path):
     np.testing.assert_array_equal(run.columns["supply"], WARM)
 
 
+def test_clocks_of_two_groups_may_be_in_two_units(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    warm_s = np.arange(0.0, 40.0, 2.0)
+    groups = {"g": {"time [ms]": 1000.0 * TIME, "gyro [deg/h]": GYRO}}
+    groups["rack"] = {"time [s]": warm_s, "T [degC]": 20.0 + warm_s / 8.0}
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        for group, columns in groups.items():
+            writer.write_segment([nptdms.ChannelObject(group, *column) for column in columns.items()])
+    run = read_run(tmp_path / "log.tdms")
+    np.testing.assert_allclose(run.time, TIME)
+    np.testing.assert_allclose(run.columns["T"], 20.0 + TIME / 8.0)
+
+
 def test_a_column_that_two_groups_hold_is_of_the_first_and_the_other_is_told(tmp_path):
     nptdms = pytest.importorskip("nptdms")
     groups = {"g": {"gyro [deg/h]": GYRO}, "inner": {"T [degC]": WARM}, "rack": {"T [degC]": WARM + 30.0}}
