@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator
 from copy import copy
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,7 +89,8 @@ def read_csv(path: Path, *, repair: bool, seconds: Collection[int] = ()) -> RawT
         raise cut_error(path, cut)
     message = f"the last row, cut off in the middle of a number, dropped: {whole.row_name(len(whole) - 1)}"
     note = Finding("repaired_rows", message, row=len(whole))
-    return next(whole.blocks(max(len(whole) - 1, 1))).noting([note])
+    columns = {cell: values[: max(len(whole) - 1, 1)] for cell, values in whole.columns.items()}
+    return replace(whole, columns=columns).noting([note])
 
 
 def csv_blocks(

@@ -223,12 +223,6 @@ class RawTable:
         """The table with more findings."""
         return replace(self, findings=(*self.findings, *findings))
 
-    def blocks(self, rows: int) -> Iterator[RawTable]:
-        """The table cut into blocks of at most `rows` rows, as views."""
-        for start in range(0, len(self), rows):
-            columns = {cell: values[start : start + rows] for cell, values in self.columns.items()}
-            yield replace(self, columns=columns, row_name=_shifted(self.row_name, start))
-
 
 def _shifted(row_name: Callable[[int], str], start: int) -> Callable[[int], str]:
     """Names rows of a block that begins at the row with index `start`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
 from fogml.runs.encodings import encoding_of
 from fogml.runs.profile_draft import draft_profile
 from fogml.runs.profiles import import_recording, load_profile
@@ -50,3 +51,15 @@ def test_a_run_and_its_draft_have_the_columns_that_were_written(tmp_path, header
     for run in (read_run(path), *import_recording(path, load_profile(tmp_path / "p.yaml"))):
         assert set(run.columns) == {"time", "gyro", "T"}
         np.testing.assert_allclose(run.gyro, 9.5 + np.arange(COUNT) ** 2 % 37)
+
+
+def test_a_long_file_in_utf_16_that_is_cut_within_a_number_is_noticed(tmp_path):
+    rows = [f"{i / 10:.1f},{i % 7}.1234" for i in range(4000)]
+    text = f"time [s],gyro [deg/h]\n{chr(10).join(rows)}\n"
+    (tmp_path / "a.csv").write_bytes(text.encode("utf-16"))
+    assert len(read_run(tmp_path / "a.csv")) == 4000
+    (tmp_path / "b.csv").write_bytes(text[:-3].encode("utf-16"))
+    with pytest.raises(InputError, match=r"in the middle of a number, '399\.9,2\.12"):
+        read_run(tmp_path / "b.csv")
+    repaired = read_run(tmp_path / "b.csv", repair=True)
+    np.testing.assert_array_equal(repaired.gyro, read_run(tmp_path / "a.csv").gyro[:-1])

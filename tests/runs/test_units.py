@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.runs.columns import canonical_unit, conversion, converted
+from fogml.runs.columns import KNOWN, canonical_unit, conversion, converted
 from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.profiles import import_recording
 from fogml.runs.reading import read_run
@@ -94,3 +94,8 @@ def test_angles_of_a_sample_are_refused_with_the_profile_that_makes_rates_of_the
 def test_signs_of_degrees_that_were_read_as_others(unit, known):
     """As files in code page 437, MacRoman or UTF-8 show them where they are read as Latin-1."""
     assert canonical_unit(unit) == known
+
+
+def test_a_column_in_its_internal_unit_is_left_as_it_is():
+    for name, spec in KNOWN.items():
+        assert spec.units[spec.internal] == (1.0, 0.0), name
