@@ -16,7 +16,7 @@ from fogml.gap.linear_gaussian import Posterior
 from fogml.gap.noise import white_noise
 from fogml.gap.posterior import Cause
 from fogml.gap.result_parts import HowFar
-from fogml.gap.where import averages
+from fogml.gap.where import Averages, averages
 from fogml.intervals import TAILS, Z90
 from fogml.numerals import listed, short
 from fogml.signals.distributions import root_of
@@ -100,12 +100,12 @@ class Foretold:
         means = {c: values[cycle == c].mean(axis=0) for c in np.unique(cycle).tolist()}
         return np.asarray(values - np.array([means[c] for c in cycle.tolist()]))
 
-    def drawn_on(self, run: int, rng: np.random.Generator) -> FloatArray:
-        """Draws of what is foretold less what is [deg/h], shape (m, draws)."""
+    def drawn_on(self, run: int, windows: Averages, rng: np.random.Generator) -> FloatArray:
+        """Draws of what is foretold less what is, averaged over windows [deg/h], shape (k, draws)."""
         slopes = [form.slopes_on(run, unknowns) for form, unknowns in self.forms.values()]
         drawn = self.drawn(rng)
-        off = drawn[:, 1:] - drawn[:, :1]
-        return self._beside_anew(run, np.concatenate([self.design(run), *slopes], axis=1) @ off)
+        columns = self._beside_anew(run, np.concatenate([self.design(run), *slopes], axis=1))
+        return np.asarray(windows.of(columns) @ (drawn[:, 1:] - drawn[:, :1]))
 
     def of_cause(self, run: int, cause: Cause) -> FloatArray:
         """What one cause makes on a run [deg/h], with what the model has of it, shape (m,)."""
@@ -187,7 +187,8 @@ class HeldOut:
         windows, rec, floor = self._windows, self._recalibrated, self._floor
         left = after.left_on(self.run)
         aft = _square(windows.of(left))
-        closed, interval, draws = None, None, self._settings.draws
+        closed, interval = None, None
+        draws, least = self._settings.draws, self._settings.least_gap
         within = "at the floor within its noise"
         if rec > floor and self._anew:
             within = f"within noise and what is drawn anew on each run ({listed(self._anew)})"
@@ -207,11 +208,11 @@ class HeldOut:
                     said.append(
                         "what is left is beyond noise; against the twin that is written more may be named"
                     )
-                drawn_left = left[:, None] - after.drawn_on(self.run, self._rng)
-                moved = np.array([_square(windows.of(column)) for column in drawn_left.T]) - aft
-            room = np.maximum(aft - self._rng.choice(self._noises, (draws, draws)), 0.0)
-            closing = rec - aft + np.minimum(moved[:, None], room)
-            drawn = closing / np.maximum(rec - self._floors[None, :], self._settings.least_gap * gap)
+                off = after.drawn_on(self.run, windows, self._rng)
+                moved = np.mean((windows.of(left)[:, None] - off) ** 2, axis=0) - aft
+            room = np.maximum(aft - self._rng.choice(self._noises, draws), 0.0)
+            closing = rec - aft + np.minimum(moved, room)
+            drawn = closing / np.maximum(rec - self._rng.choice(self._floors, draws), least * gap)
             low, high = np.quantile(drawn, TAILS)
             interval = min(float(low), closed), max(float(high), closed)
         return HowFar(

@@ -44,9 +44,9 @@ class Averages:
     full: BoolArray
 
     def of(self, rows: FloatArray) -> FloatArray:
-        """Averages of a series of rows, shape (m,) to (k,)."""
+        """Averages of series of rows, shape (m, ...) to (k, ...)."""
         counts = np.diff(self.starts, append=len(rows))
-        return np.asarray((np.add.reduceat(rows, self.starts) / counts)[self.full])
+        return np.asarray((np.add.reduceat(rows, self.starts).T / counts).T[self.full])
 
 
 def averages(rows: Rows, averaging_s: float = Reported.averaging_s) -> Averages:
