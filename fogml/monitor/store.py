@@ -173,21 +173,26 @@ class DatabaseStore(Store):
         from sqlalchemy import insert, update
         from sqlalchemy.exc import IntegrityError
 
+        # A server that goes away may have written what it did not confirm: the next try finds it there.
+        added: set[str] = set()
+
         def write() -> int:
             table, engine = self._open()
             with engine.begin() as connection:
                 new, other = _to_write(records, _held(connection, table))
+                added.update(record.key for record in new)
                 if new:
                     connection.execute(insert(table), [asdict(record) for record in new])
                 for key, record in other.items():
                     connection.execute(update(table).where(table.c.key == key), asdict(record))
-                return len(new)
+                return len(added)
 
         def at_once() -> int:
             try:
                 return write()
             except IntegrityError:
                 # Another station wrote one of them at this moment: the next try finds it.
+                added.clear()
                 return write()
 
         return self._told(at_once)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from sqlalchemy.exc import OperationalError
 
 from experiments.faults.postgres import free_port, postgres, program, restart
 from fogml.errors import InputError
@@ -136,6 +137,31 @@ def test_a_database_of_several_stations(database):  # noqa: F811
     same(first.records(), others(4))
     first.close()
     second.close()
+
+
+class _Unconfirmed:
+    """An engine whose server is gone once, after it has written and before it says so."""
+
+    def __init__(self, engine):
+        self._engine, self._gone = engine, False
+
+    @contextmanager
+    def begin(self):
+        with self._engine.begin() as connection:
+            yield connection
+        if not self._gone:
+            self._gone = True
+            raise OperationalError("commit", {}, RuntimeError("server closed the connection"))
+
+
+def test_runs_that_were_written_without_a_word_are_counted(tmp_path, monkeypatch):
+    with closing(open_store(places(tmp_path)[1])) as store:
+        assert store.add(others(2)) == 2
+        table, engine = store._open()
+        away = _Unconfirmed(engine)
+        monkeypatch.setattr(store, "_open", lambda: (table, away))
+        assert store.add(others(5)) == 3
+        assert store.add(others(5)) == 0
 
 
 def test_a_database_that_ends_as_by_a_crash_and_comes_back_has_every_run_once():
