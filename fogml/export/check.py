@@ -32,6 +32,7 @@ READING_STEP_DEGC = 1.0 / 16.0
 """Steps of a thermometer in use, a DS18B20's, in which a history is read where windows are held in bins."""
 _BEYOND = 0.2
 TURN_DEG_H = 36_000.0
+"""Rate of turn at which a scale factor's difference is told: 1 ppm of it is 0.036 deg/h, beyond rounding."""
 
 
 @dataclass(frozen=True)

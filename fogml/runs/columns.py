@@ -212,6 +212,11 @@ def coil_sensor_number(name: str) -> int | None:
     return int(match[1]) if match else None
 
 
+def of_a_sensor(name: str) -> bool:
+    """Whether run-format knows a column as what a sensor beside the gyro reads."""
+    return name not in ("time", "gyro", REPLAYED) and (name in KNOWN or coil_sensor_number(name) is not None)
+
+
 def column_spec(name: str) -> ColumnSpec | None:
     """The specification of a column, or None for a name that run-format does not know."""
     if name in KNOWN:

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fogml.errors import InputError, known_are
-from fogml.runs.columns import KNOWN, REPLAYED, coil_sensor_number, header, is_temperature
+from fogml.runs.columns import KNOWN, header, is_temperature, of_a_sensor
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.possible import check_columns
 from fogml.runs.run import FloatArray, Run
@@ -46,7 +46,6 @@ DEFAULT_COLUMNS = (
 DEFAULT_FACTS = Facts(axis="x", latitude=39.9, input_axis="up")
 BLOCK_ROWS = 3 << 14
 """Samples worked out at once: many enough that two threads seldom wait for each other's turn."""
-NO_SENSOR = ("time", "gyro", REPLAYED)
 _ROUNDED = 1e-6
 """Of a count: what a rate's digits leave of it."""
 
@@ -244,8 +243,8 @@ def world_of(
         stated = stated.model_copy(update={"scale_factor": ScaleFactor(value=counts)})
     names = tuple(DEFAULT_COLUMNS if columns is None else columns)
     for name in names:
-        if name in NO_SENSOR or (name not in KNOWN and coil_sensor_number(name) is None):
-            known = [key for key in KNOWN if key not in NO_SENSOR]
+        if not of_a_sensor(name):
+            known = [key for key in KNOWN if of_a_sensor(key)]
             raise InputError(
                 f"columns: '{name}' can't be recorded; {known_are(name, known)} and coil sensors T1, T2 ..."
             )

@@ -11,8 +11,6 @@ from fogml.errors import InputError
 from fogml.settings_check import check_numbers
 from fogml.twin.steps import FASTEST_DEG_S
 
-ROOM_DEGC = 25.0
-_HALVINGS = (3, 2, 1, 0)
 _LADDERS: Mapping[str, tuple[float, ...]] = MappingProxyType(
     {
         "one rate": (10.0, -10.0),
@@ -93,8 +91,8 @@ class Lab:
     @property
     def ramp_rates(self) -> tuple[float, float, float, float]:
         """Rates of ramps that are tried, the slowest first [degC/min]."""
-        eighth, quarter, half, whole = (self.fastest_ramp / 2.0**n for n in _HALVINGS)
-        return eighth, quarter, half, whole
+        whole = self.fastest_ramp
+        return whole / 8.0, whole / 4.0, whole / 2.0, whole
 
     @property
     def ladders(self) -> dict[str, tuple[float, ...]]:

@@ -26,14 +26,12 @@ from fogml.gap.posterior import Judgement
 from fogml.gap.result import Found, SeparatingRun
 from fogml.gap.rows import Rows, at_amplitude
 from fogml.numerals import ascii_number
-from fogml.runs.columns import KNOWN, coil_sensor_number
-from fogml.runs.run import Run
+from fogml.runs.columns import of_a_sensor
 from fogml.settings_check import check_numbers
 from fogml.signals.bases import corners
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.programme import Programme, programme_from
 from fogml.twin.registry import effect
-from fogml.twin.simulate import NO_SENSOR
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,9 @@ def next_run(
         return None
     twin, noise = found.model.twin, found.field.whitening.noise
     first, values = found.scene.runs[0].run, found.setting.values
-    on = stage(twin, noise, values, facts=first.facts, columns=_recorded(first))
+    on = stage(
+        twin, noise, values, facts=first.facts, columns=[name for name in first.columns if of_a_sensor(name)]
+    )
     open_ = next((f for f in items if f.named and len(f.members) > 1), None)
     if open_ is None:
         if not undetectable:
@@ -203,13 +203,6 @@ def next_run(
     if len(members) < 2:
         return None
     return separating_run(on, family, members, seed=seed, progress=tell, most=MOST_PROGRAMMES)
-
-
-def _recorded(run: Run) -> list[str]:
-    """Columns of a run that a simulation records as well."""
-    return [name for name in run.columns if name in KNOWN and name not in NO_SENSOR] + [
-        name for name in run.columns if coil_sensor_number(name) is not None
-    ]
 
 
 def _members(found: Inference, judged: Judgement, item: Found) -> list[EffectValue]:

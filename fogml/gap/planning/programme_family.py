@@ -16,10 +16,11 @@ from typing import Any, Literal
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.planning.lab import ROOM_DEGC, Lab
+from fogml.gap.planning.lab import Lab
 from fogml.numerals import short
 from fogml.twin.programme import Programme
 from fogml.twin.steps import Action, Ramp, Setting, Soak, Step, Turn, duration_text
+from fogml.twin.timeline import ROOM_DEGC
 
 Mounting = Literal["up", "down", "north", "south", "east", "west"]
 
