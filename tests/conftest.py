@@ -1,6 +1,7 @@
 """What all tests share: hypothesis repeats itself, taking its time; noise of a series is fitted once.
 
-Libraries and tests, once loaded, are passed over by the garbage collector: going through them takes time.
+The garbage collector waits until libraries and tests are loaded and passes them over then: going through them
+takes time.
 """
 
 from __future__ import annotations
@@ -20,9 +21,13 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 
+gc.disable()
+
+
 def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
+    gc.enable()
     gc.set_threshold(20_000, 10, 10)
 
 

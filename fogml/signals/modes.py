@@ -151,7 +151,8 @@ def modes_kernel(
     while i < n:
         stop = i + 1
         if math.isnan(before_t):
-            modes[:, 0] = z
+            for j in range(m):
+                modes[j, 0] = z[j]
         else:
             if not _same(time[i] - before_t, step, time[i]):
                 step, known = time[i] - before_t, False
@@ -220,7 +221,8 @@ def modes_kernel(
                     for s in range(stop - i):
                         row[s] += feed[c, a] * inputs[c, i + s]
         before_t = time[stop - 1]
-        before[:] = inputs[:, stop - 1]
+        for c in range(k):
+            before[c] = inputs[c, stop - 1]
         following = level[min(stop, len(level)) - 1]
         if following != now:
             _product(to_states[now], z, states)

@@ -225,7 +225,9 @@ def whiten_kernel(
                     z[j, q] = kept * z[j, q] + taken * error[q]
                     predicted[q] += weight * z[j, q]
                 j += 1
-        states[:, left:right] = z
+        for j in range(size):
+            for q in range(width):
+                states[j, left + q] = z[j, q]
 
 
 @kernel()
