@@ -49,10 +49,22 @@ def test_averages_of_every_run_with_a_chart(tmp_path: Path) -> None:
     assert np.allclose(np.array(after, dtype=float), judged.test[1].series.after, rtol=1e-14)
     assert [row[rows[0].index("regime")] for row in rows[1:]] == judged.test[1].series.regime.tolist()
     assert "train 1 a.csv" in found
-    with zipfile.ZipFile(tmp_path / "report.xlsx") as archive:
-        charts = [name for name in archive.namelist() if name.startswith("xl/charts/chart")]
-        assert len(charts) == 3
-        assert b"test 1 b.csv" in archive.read("xl/charts/chart1.xml")
+    workbook = openpyxl.load_workbook(tmp_path / "report.xlsx")
+    for told in (*judged.train, *judged.test):
+        (sheet,) = [sheet for sheet in workbook.worksheets if sheet.title.endswith(told.run)]
+        (chart,) = sheet._charts
+        assert len(chart.series) == 2
+        for drawn, name in zip(chart.series, ("before", "after"), strict=True):
+            assert cells(workbook, drawn.tx.strRef.f) == [f"{name} [deg/h]"]
+            for at, values in ((drawn.xVal, told.series.time), (drawn.yVal, getattr(told.series, name))):
+                np.testing.assert_allclose(cells(workbook, at.numRef.f), values, rtol=1e-14)
+
+
+def cells(workbook: openpyxl.Workbook, reference: str) -> list[Any]:
+    """What stands in a range that a chart is drawn from."""
+    sheet, _, span = reference.rpartition("!")
+    found = workbook[sheet.strip("'")][span]
+    return [row[0].value for row in found] if isinstance(found, tuple) else [found.value]
 
 
 def test_the_summary_states_verdict_and_limits(tmp_path: Path) -> None:
