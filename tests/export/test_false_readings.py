@@ -233,3 +233,9 @@ def test_a_column_that_no_rate_is_told_of_crosses_its_range_in_a_quarter_of_an_h
     low, high, fastest = sensor_range(Plan.of(model), "supply")
     assert (low, high) == pytest.approx((volts.min(), volts.max()), abs=0.02)
     assert fastest * 15.0 == pytest.approx(high - low)
+
+
+@pytest.mark.parametrize("features", ["T, dT", "T, diff(T)[300 s]", "T, diff(T)[first]"])
+def test_the_fastest_rate_of_training_is_told_however_a_feature_takes_it(features):
+    plan = Plan.of(make_model("polynomial", features=features).fit(ramps()))
+    assert sensor_range(plan, "T") == pytest.approx((-20.0, 60.0, 4.0))
