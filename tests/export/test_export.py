@@ -132,14 +132,18 @@ def test_the_file_alone_is_enough_to_compute_the_drift(model_of, tmp_path, name)
     given = box_points(plan, 1, beyond=1.0, count=400)
     gyro = np.linspace(-9.0, 9.0, 400)
     low, high, margin = (np.array([atom[end] for atom in held["atoms"]]) for end in ("low", "high", "margin"))
+    half = 0.5 * (high[0] - low[0])
+    assert given[:, 0].min() < low[0] - half and given[:, 0].max() > high[0] + half
     past = np.maximum(np.maximum(given - high, low - given), 0.0)
     atoms = np.clip(given, low, high) + np.sign(given - low) * margin * past / (margin + past)
     expected = plan.value(plan.full_columns(given), gyro)
     np.testing.assert_allclose(by_hand(held, arrays, atoms, gyro), expected, atol=1e-9)
     assert {atom["operator"] for atom in held["atoms"]} == set(held["operators"])
     assert {atom["window"]["method"] for atom in held["atoms"] if atom["window"]} == set(held["windows"])
-    # In MATLAB's file a feature is a product of powers.
+    # In MATLAB's file a feature is a product of powers, and columns count from 1.
     fields = loadmat(tmp_path / "fogml_model.mat", simplify_cells=True)["fogml"]
+    for columns in ("network_columns", "edge_columns"):
+        assert np.atleast_1d(fields[columns]).tolist() == [k + 1 for k in held[columns]]
     f = np.prod(atoms[:, None, :] ** np.atleast_2d(fields["powers"]), axis=2)
     np.testing.assert_allclose(f, plan.compose(atoms), rtol=1e-12)
     assert json.loads(fields["document"]) == {key: held[key] for key in json.loads(fields["document"])}

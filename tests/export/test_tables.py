@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from fogml.errors import InputError
+from fogml.export.losses import runs_of_each
 from fogml.export.plan import Plan
 from fogml.export.segments import segments
 from fogml.export.static_curve import StaticCurve
@@ -276,6 +277,12 @@ def test_a_run_that_none_was_trained_on_is_refused(axes, tmp_path):
     other = run.with_columns(gyro=run.gyro + 1.0)
     with pytest.raises(InputError, match="is not one of the runs that the model was trained on"):
         export_tables(models, tmp_path, TableSettings("segments"), [other])
+
+
+def test_each_model_gets_the_runs_that_it_was_trained_on(axes):
+    models, runs = [model for model, _ in axes.values()], [run for _, run in axes.values()]
+    assert runs_of_each(models, runs[::-1]) == [[run] for run in runs]
+    assert runs_of_each(models[:2], runs[1:2]) == [[], runs[1:2]]
 
 
 def test_a_joint_models_scale_factor(model_of, tmp_path):

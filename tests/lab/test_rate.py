@@ -13,7 +13,7 @@ import pytest
 from fogml.arrays import FloatArray
 from fogml.errors import InputError
 from fogml.lab.rate_json import rate_json, unit_facts
-from fogml.lab.rate_pieces import find_oscillations, find_plateaus, merged
+from fogml.lab.rate_pieces import Oscillation, find_oscillations, find_plateaus, merged
 from fogml.lab.rate_programmes import rate_runs
 from fogml.lab.rate_response import bandwidth, gain_of
 from fogml.lab.rate_temperature import temperature_sensitivity
@@ -276,6 +276,20 @@ def test_gain_of_a_delayed_wave_by_hand() -> None:
     assert found.gain == pytest.approx(0.8, rel=1e-3)
     assert found.phase_deg == pytest.approx(-math.degrees(0.3), abs=0.05)
     assert bandwidth([found]) is None
+
+
+def test_a_gain_scatters_by_its_standard_error() -> None:
+    random, time = np.random.default_rng(5), 1e-3 * np.arange(3000.0)
+    wave = Oscillation(0, len(time), 5.0)
+    rate = 2.0 * np.sin(10.0 * math.pi * time)
+    found = [
+        gain_of(Run("wave", {"time": time, "gyro": gyro, "rate": rate}, Facts()), wave)
+        for gyro in 5760.0 * np.sin(10.0 * math.pi * time - 0.3)
+        + 500.0 * random.standard_normal((300, len(time)))
+    ]
+    gains = np.array([one.gain for one in found])
+    assert np.std(gains) == pytest.approx(np.mean([one.se for one in found]), rel=0.12)
+    assert abs(np.mean(gains) - 0.8) < 4.0 * np.std(gains) / math.sqrt(len(gains))
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
