@@ -196,8 +196,10 @@ def another_header(file: str, line: int, text: str) -> InputError:
     )
 
 
-def fields_of(line: str, separator: str) -> list[str]:
-    """The fields of one line."""
+def fields_of(line: str, separator: str | None) -> list[str]:
+    """The fields of one line; no separator stands for blanks."""
+    if separator is None:
+        return line.split()
     if line and '"' not in line:
         return line.split(separator)
     return next(csv.reader([line], delimiter=separator), [])
@@ -211,7 +213,8 @@ def with_cells_above(fields: list[str], above: Sequence[str]) -> list[str]:
 
 
 def is_number_like(field: str) -> bool:
-    """Whether a field is a number with any marks, or a date or a time of day."""
+    """Whether a field is a number with any marks, or a date or a time of day, perhaps in quotation marks."""
+    field = field.strip(' "')
     return bool(_NUMBER_LIKE.match(field)) or stamp_form([field]) is not None
 
 
@@ -241,7 +244,7 @@ def _separator(header: str, below: Sequence[str]) -> str:
         return found[0] if found else SEPARATORS[0]
 
     def numbers(mark: str) -> int:
-        return sum(is_number_like(field.strip(' "')) for line in below for field in fields_of(line, mark))
+        return sum(is_number_like(field) for line in below for field in fields_of(line, mark))
 
     return max(found, key=lambda mark: (numbers(mark), counts[mark]))
 
@@ -250,7 +253,7 @@ def _has_numbers(lines: Sequence[str], header: Header) -> bool:
     """Whether the first line below a header is one of numbers, or there is none."""
     line = next((line for line in lines[header.data :] if line.strip()), "")
     fields = [field for field in fields_of(line, header.separator) if field.strip()]
-    return 2 * sum(is_number_like(field.strip(' "')) for field in fields) >= len(fields)
+    return 2 * sum(is_number_like(field) for field in fields) >= len(fields)
 
 
 def _cells(fields: Sequence[str]) -> tuple[str, ...]:

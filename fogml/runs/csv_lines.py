@@ -269,7 +269,7 @@ def cut_line(source: CsvSource, separator: str | None, decimal: str) -> str | No
         return None
     # The first line of the tail may be a part of one.
     lines = [line for line in re.split(r"[\r\n]+", tail.decode("latin-1"))[1:] if line.strip()]
-    widths = {len(line.split() if separator is None else fields_of(line, separator)) for line in lines[-2:]}
+    widths = {len(fields_of(line, separator)) for line in lines[-2:]}
     fields = [line.rsplit(separator, 1)[-1].strip(' "') for line in lines]
     # A row that ends before its last field is one cut short, whatever it ends with.
     if len(fields) <= _LEAST_LINES or len(widths) > 1:

@@ -64,7 +64,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
     mark = SEPARATORS[name]
     if data is None:
         raise InputError(f"{path.name}: no rows of numbers in its first lines; a draft needs some")
-    rows = [_split(line, mark) for line in lines[data : data + MOST_ROWS] if not _is_blank(line, mark)]
+    rows = [fields_of(line, mark) for line in lines[data : data + MOST_ROWS] if not _is_blank(line, mark)]
     width = len(rows[0])
     numeric = _numeric(rows, width)
     rows = [row for row in rows if _is_data(row, width, numeric)]
@@ -80,7 +80,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
     header = _Header.above(lines, data, width, mark)
     if header is None:
         # Facts have names; without any, every line of as many numbers is one of the data.
-        begin = next(i for i, line in enumerate(lines) if _is_data(_split(line, mark), width, numeric))
+        begin = next(i for i, line in enumerate(lines) if _is_data(fields_of(line, mark), width, numeric))
         data, is_broken = begin, is_broken or begin < data
     if header is None or header.is_by_place:
         # A name would be of none of its columns, or of several.
@@ -138,7 +138,7 @@ class _Header:
         if stated := labview_header(lines) or campbell_header(lines):
             spelled = canonical_cells(stated.cells)
             return cls(stated.line, list(zip(stated.cells, spelled)), is_by_place=True)
-        split = [(i, _split(lines[i], mark)) for i in range(data) if lines[i].strip()]
+        split = [(i, fields_of(lines[i], mark)) for i in range(data) if lines[i].strip()]
         # A mark of comments between blanks is a field too many.
         is_marked = [
             len(cells) == width + 1 and (cells[0] == ";" or not uncommented(cells[0])) for _, cells in split
@@ -165,7 +165,7 @@ def _are_names(cells: Sequence[str]) -> bool:
     """Whether the cells of a line are names, numbers beside those of a time and a gyro apart."""
     if re.search(r"[\0-\x08\x0e-\x1f]", "".join(cells)):
         return False
-    if not any(is_number_like(cell.strip(' "')) for cell in cells):
+    if not any(is_number_like(cell) for cell in cells):
         return True
     return Header(0, 1, "", canonical_cells([cell.strip(' "') for cell in cells])).is_sure
 
@@ -183,13 +183,13 @@ def _are_below(
     tail = CsvSource(path, wide).tail(_TAIL_BYTES).decode(errors="replace").rstrip("\0")
     tail = frames_checked(tail.encode()).decode() if has_sums else tail
     tail = tail if stamp is None else stamp_apart(tail, stamp, mark)
-    lines = [_split(line, mark) for line in re.split(r"\r\n|\r|\n", tail)[1:] if line.strip()]
+    lines = [fields_of(line, mark) for line in re.split(r"\r\n|\r|\n", tail)[1:] if line.strip()]
     width = len(rows[0])
     # Of a short file the last of them are those that stand below.
     numeric = _numeric(rows, width)
     full = [row for row in rows[: len(rows) // 2 + 1] if _is_data(row, width, numeric)]
-    held = [i for i in range(width) if all(is_number_like(row[i].strip(' "')) for row in full)]
-    return any(len(f) != width or not all(is_number_like(f[i].strip(' "')) for i in held) for f in lines)
+    held = [i for i in range(width) if all(is_number_like(row[i]) for row in full)]
+    return any(len(f) != width or not all(is_number_like(f[i]) for i in held) for f in lines)
 
 
 def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None, bool]:
@@ -201,13 +201,13 @@ def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None,
         if labview is not None and mark != labview.separator:
             continue
         lines = _lines(text if stamp is None else stamp_apart(text, stamp, mark))
-        rows = [_split(line, mark) for line in lines[-MOST_ROWS:] if line.strip()]
+        rows = [fields_of(line, mark) for line in lines[-MOST_ROWS:] if line.strip()]
         counts = [len(row) for row in rows]
         width = max(set(counts), key=counts.count) if counts else 0
         numeric = _numeric(rows, width)
-        is_data = [_is_blank(t, mark) or _is_data(_split(t, mark), width, numeric) for t in lines]
+        is_data = [_is_blank(t, mark) or _is_data(fields_of(t, mark), width, numeric) for t in lines]
         first = _first_of_rows(is_data, [not _is_blank(t, mark) for t in lines])
-        numbers = [sum(is_number_like(f.strip(' "')) for f in row) for row in rows]
+        numbers = [sum(is_number_like(f) for f in row) for row in rows]
         # Of separators that make as many numbers one makes them alone: a decimal comma parts their digits.
         score = (
             (float(np.median(numbers)), float(np.median(np.subtract(numbers, counts))))
@@ -245,18 +245,12 @@ def _first_of_rows(is_data: Sequence[bool], is_filled: Sequence[bool]) -> int | 
 def _numeric(rows: Sequence[Sequence[str]], width: int) -> list[int]:
     """Places at which most rows of a width hold numbers: a status or a code in hexadecimal does by chance."""
     full = [row for row in rows if len(row) == width]
-    return [
-        i for i in range(width) if 2 * sum(is_number_like(row[i].strip(' "')) for row in full) > len(full)
-    ]
+    return [i for i in range(width) if 2 * sum(is_number_like(row[i]) for row in full) > len(full)]
 
 
 def _is_data(fields: Sequence[str], width: int, numeric: Sequence[int]) -> bool:
-    numbers = [is_number_like(fields[i].strip(' "')) for i in numeric] if len(fields) == width else []
+    numbers = [is_number_like(fields[i]) for i in numeric] if len(fields) == width else []
     return bool(numbers) and 2 * sum(numbers) >= len(numbers)
-
-
-def _split(line: str, mark: str | None) -> list[str]:
-    return line.split() if mark is None else fields_of(line, mark)
 
 
 def as_yaml(value: str | int) -> str:
