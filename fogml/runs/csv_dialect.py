@@ -11,15 +11,21 @@ from pathlib import Path
 from fogml.errors import InputError, printable
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.csv_header import fields_of, header_over_lines
-from fogml.runs.csv_source import CsvSource, Marks, csv_source, is_binary, marks_of, number
+from fogml.runs.csv_source import (
+    HEAD_BYTES,
+    LINE_END,
+    CsvSource,
+    Marks,
+    csv_source,
+    is_binary,
+    marks_of,
+    number,
+)
 from fogml.runs.encodings import encoding_of
 from fogml.runs.header_spelling import DATE_NAMES, MILLISECOND_NAMES, PARTS_OF_A_SECOND
 from fogml.runs.raw_table import empty_file, wanted_cells
 from fogml.runs.stamp_forms import FRACTION, StampForm
 from fogml.runs.stamps import DECIMALS, MILLISECONDS, Stamps, stamps_of
-
-_HEAD_BYTES = 1 << 16
-_LINE_END = re.compile(r"\r\n|\r|\n")
 
 
 @dataclass(frozen=True)
@@ -111,20 +117,16 @@ def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
     InputError
         If the file is empty, no text, or begins with numbers in place of a header.
     """
-    with path.open("rb") as file:
-        raw = file.read(_HEAD_BYTES)
-    source = csv_source(path, raw)
-    with source.open() as opened:
-        head = opened.read(_HEAD_BYTES)
-    cut = len(head) == _HEAD_BYTES
+    source, raw, head = csv_source(path)
+    cut = len(head) == HEAD_BYTES
     encoding = encoding_of(head, cut)
-    lines = _LINE_END.split(head.decode(encoding, errors="ignore"))
+    lines = LINE_END.split(head.decode(encoding, errors="ignore"))
     if cut and len(lines) > 1:
         lines.pop()  # incomplete
     header = header_over_lines(lines)
     if cut and (header is None or len(lines) == 1):
         raise InputError(
-            f"{path.name}: no line ends within the first {_HEAD_BYTES} bytes; a header such as "
+            f"{path.name}: no line ends within the first {HEAD_BYTES} bytes; a header such as "
             "'time [s],gyro [deg/h],T [degC]' and rows of numbers were expected"
         )
     if header is None:
@@ -165,17 +167,13 @@ def decoded_head(path: Path) -> tuple[str, str]:
     InputError
         If it is no text.
     """
-    with path.open("rb") as file:
-        raw = file.read(_HEAD_BYTES)
-    source = csv_source(path, raw)
-    with source.open() as opened:
-        head = opened.read(_HEAD_BYTES)
+    source, _, head = csv_source(path)
     if is_binary(head[:1000].decode("latin-1")):
         raise _no_text(path.name)
-    encoding = encoding_of(head, len(head) == _HEAD_BYTES)
+    encoding = encoding_of(head, len(head) == HEAD_BYTES)
     text = head.decode(encoding, errors="replace")
     # A line that the head cuts is left out.
-    return text if len(head) < _HEAD_BYTES else text[: text.rfind("\n") + 1], source.wide or encoding
+    return text if len(head) < HEAD_BYTES else text[: text.rfind("\n") + 1], source.wide or encoding
 
 
 def text_of(path: Path) -> str:
@@ -187,8 +185,7 @@ def text_of(path: Path) -> str:
         If it is no text.
     """
     decoded_head(path)
-    with path.open("rb") as file:
-        source = csv_source(path, file.read(_HEAD_BYTES))
+    source, *_ = csv_source(path)
     with source.open() as opened:
         content = opened.read()
     return content.decode(encoding_of(content, cut=False), errors="replace")
@@ -209,7 +206,7 @@ def has_rows(content: bytes) -> bool:
 
 
 def _head_lines(content: bytes) -> list[str]:
-    return _LINE_END.split(content[:_HEAD_BYTES].decode("utf-8", errors="ignore"))
+    return LINE_END.split(content[:HEAD_BYTES].decode("utf-8", errors="ignore"))
 
 
 def _clock(

@@ -18,6 +18,9 @@ import numpy as np
 
 from fogml.errors import quoted
 
+HEAD_BYTES = 1 << 16
+"""Of which it is told how a file is written."""
+LINE_END = re.compile(r"\r\n|\r|\n")
 _PART_BYTES = 1 << 20
 LINES_BYTES = 1 << 23
 """Of a long file, parsed at once and then let go: some 100,000 rows."""
@@ -111,32 +114,35 @@ def is_binary(start: str) -> bool:
     return controls > _MOST_CONTROLS * len(start)
 
 
-def csv_source(path: Path, head: bytes) -> CsvSource:
-    """How a file is to be opened, told from its first bytes and its last ones."""
+def csv_source(path: Path) -> tuple[CsvSource, bytes, bytes]:
+    """How a file is to be opened, told from its first bytes and its last ones.
+
+    Also the former, `HEAD_BYTES` of the file and of the text that its parsers take.
+    """
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
     wide = _BYTE_ORDER_MARKS.get(head[:2])
     if wide is None and len(head) > 3:
         # UTF-16 without its mark: every other byte of plain letters is zero.
         for at, name in enumerate(("utf-16-be", "utf-16-le")):
             if not any(head[at:256:2]) and all(head[1 - at : 256 : 2]):
                 wide = name
-    if wide:
-        return CsvSource(path, wide)
-    end = _without_padding(path)
-    size = path.stat().st_size
-    kept = head[: end if end < size else len(head)]
-    return CsvSource(path, None, end if end < size else None, b"\0" in kept)
+    end = None if wide else _without_padding(path)
+    source = CsvSource(path, wide, end, padded=wide is None and b"\0" in head[:end])
+    with source.open() as opened:
+        return source, head, opened.read(HEAD_BYTES)
 
 
-def _without_padding(path: Path) -> int:
-    """Bytes of a file before the zero bytes at its end."""
+def _without_padding(path: Path) -> int | None:
+    """Bytes of a file before the zero bytes at its end; None where there are none."""
     with path.open("rb") as file:
-        end = file.seek(0, io.SEEK_END)
+        size = end = file.seek(0, io.SEEK_END)
         while end > 0:
             start = max(end - _PART_BYTES, 0)
             file.seek(start)
             part = file.read(end - start).rstrip(b"\0")
             if part:
-                return start + len(part)
+                return start + len(part) if start + len(part) < size else None
             end = start
     return 0
 
@@ -176,7 +182,6 @@ class _Converted(io.RawIOBase):
 
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "-nan", "#n/a", "none"})
 """What stands for a missing value, in lower case."""
-_HEAD_BYTES = 1 << 16
 _SEARCH_BYTES = 1 << 24
 _MARK = re.compile(rb"\d[.,]\d")
 _OTHER = {".": ",", ",": "."}
@@ -287,7 +292,7 @@ def marks_of(source: CsvSource, rows: Sequence[Sequence[str]], separator: str) -
     if separator == "," or with_mark["."]:
         return Marks(".", separator == "," and bool(with_mark["."]))
     with source.open() as file:
-        file.read(_HEAD_BYTES)
+        file.read(HEAD_BYTES)
         while part := file.read(_SEARCH_BYTES):
             if found := _MARK.search(part):
                 return Marks(found[0][1:2].decode("ascii"))

@@ -24,7 +24,7 @@ from fogml.runs.csv_header import (
     labview_header,
     with_cells_above,
 )
-from fogml.runs.csv_source import PLAIN, CsvSource, Marks, marks_of, number
+from fogml.runs.csv_source import LINE_END, PLAIN, CsvSource, Marks, marks_of, number
 from fogml.runs.frames import frames_checked, is_frame
 from fogml.runs.header_spelling import canonical_cells, uncommented, with_units_below
 from fogml.runs.logger_lines import mark_of_line_stamps, stamp_apart
@@ -183,7 +183,7 @@ def _are_below(
     tail = CsvSource(path, wide).tail(_TAIL_BYTES).decode(errors="replace").rstrip("\0")
     tail = frames_checked(tail.encode()).decode() if has_sums else tail
     tail = tail if stamp is None else stamp_apart(tail, stamp, mark)
-    lines = [fields_of(line, mark) for line in re.split(r"\r\n|\r|\n", tail)[1:] if line.strip()]
+    lines = [fields_of(line, mark) for line in LINE_END.split(tail)[1:] if line.strip()]
     width = len(rows[0])
     # Of a short file the last of them are those that stand below.
     numeric = _numeric(rows, width)
@@ -228,7 +228,7 @@ def _is_blank(line: str, mark: str | None) -> bool:
 
 def _lines(text: str) -> list[str]:
     """The lines of a text, but for the last one, which may be cut."""
-    return re.split(r"\r\n|\r|\n", text)[:-1] or [text]
+    return LINE_END.split(text)[:-1] or [text]
 
 
 def _first_of_rows(is_data: Sequence[bool], is_filled: Sequence[bool]) -> int | None:
