@@ -23,7 +23,7 @@ from fogml.runs.csv_source import (
 )
 from fogml.runs.encodings import encoding_of
 from fogml.runs.header_spelling import DATE_NAMES, MILLISECOND_NAMES, PARTS_OF_A_SECOND
-from fogml.runs.raw_table import empty_file, wanted_cells
+from fogml.runs.raw_table import empty_file, no_text, wanted_cells
 from fogml.runs.stamp_forms import FRACTION, StampForm
 from fogml.runs.stamps import DECIMALS, MILLISECONDS, Stamps, stamps_of
 
@@ -135,7 +135,7 @@ def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
     if any(ord(character) < 32 and character != "\t" for character in lines[header.line]) or (
         is_padded and not header.is_sure
     ):
-        raise _no_text(path.name)
+        raise no_text(path.name)
     rows = [fields_of(line, header.separator) for line in lines[header.data :] if line.strip()]
     marks = marks_of(source, rows, header.separator)
     named = (f"{parse_header(cell)[0]} [s]" if i in seconds else cell for i, cell in enumerate(header.cells))
@@ -169,7 +169,7 @@ def decoded_head(path: Path) -> tuple[str, str]:
     """
     source, _, head = csv_source(path)
     if is_binary(head[:1000].decode("latin-1")):
-        raise _no_text(path.name)
+        raise no_text(path.name)
     encoding = encoding_of(head, len(head) == HEAD_BYTES)
     text = head.decode(encoding, errors="replace")
     # A line that the head cuts is left out.
@@ -298,10 +298,3 @@ def _check_header(file: str, dialect: CsvDialect, row: Sequence[str]) -> None:
             "write a header such as 'time [s],gyro [deg/h],T [degC]', or correct the profile that "
             f"'fogml import {printable(file)} --draft -o profile.yaml' writes"
         )
-
-
-def _no_text(file: str) -> InputError:
-    return InputError(
-        f"{file}: not a text file (it holds control characters); CSV was expected, as it is none of "
-        "Parquet, HDF5 and MATLAB"
-    )

@@ -18,12 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fogml.arrow_arrays import takes_threads, values_of
-from fogml.errors import InputError
 from fogml.runs.csv_dialect import CsvDialect, csv_dialect
 from fogml.runs.csv_lines import LineReader, cut_error, cut_line, line_of_row, note_of_end, without_footer
 from fogml.runs.csv_source import MISSING
 from fogml.runs.findings import Finding
-from fogml.runs.raw_table import RawTable, no_samples, text_column
+from fogml.runs.raw_table import RawTable, no_samples, text_column, unreadable
 from fogml.runs.stamps import StampClock
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ def read_csv(path: Path, *, repair: bool, seconds: Collection[int] = ()) -> RawT
         clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
         whole = _raw(path, dialect, table, 0, clock)
     except OSError as error:
-        raise _unreadable(path, error) from None
+        raise unreadable(path, error) from None
     except arrow.ArrowException:
         # Arrow is fast and strict; line by line tells where the fault is, or forgives it.
         whole = LineReader(path, dialect, repair).whole()
@@ -116,7 +115,7 @@ def csv_blocks(
             told = copy(clock)
             yield raw if start > table.num_rows else raw.noting(notes)
     except OSError as error:
-        raise _unreadable(path, error) from None
+        raise unreadable(path, error) from None
     except arrow.ArrowException:
         lines = LineReader(path, dialect)
         for raw in lines.tables(rows, skip=start, clock=told):
@@ -214,7 +213,3 @@ def _raw(path: Path, dialect: CsvDialect, table: Table, start: int, clock: Stamp
         findings=tuple(text_column(dialect.name(i)) for i in sorted(dialect.text)),
         started=dialect.stamps.started if dialect.stamps else None,
     )
-
-
-def _unreadable(path: Path, error: OSError) -> InputError:
-    return InputError(f"{path.name}: cannot be read ({error.strerror or error}); copy it again")

@@ -19,7 +19,7 @@ from fogml.errors import InputError, counted, quoted
 from fogml.runs.csv_source import is_binary
 from fogml.runs.frames import frames_checked
 from fogml.runs.profile_parts import TextLayout
-from fogml.runs.raw_table import empty_file
+from fogml.runs.raw_table import empty_file, no_text, unreadable
 from fogml.runs.stamp_forms import stamp_form
 
 PART_BYTES = 1 << 23
@@ -39,7 +39,7 @@ def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[byt
                 if read == 0:
                     text = text.removeprefix("\ufeff")
                     if is_binary(text[:4096]):
-                        raise InputError(f"{path.name}: this is a binary file, a text file was expected")
+                        raise no_text(path.name)
                     only_returns = "\r" in text and "\n" not in text
                 text = (text.replace("\r", "\n") if only_returns else text).replace("\0", " ")
                 read += len(raw)
@@ -50,7 +50,7 @@ def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[byt
                     ready = b""
                 ready, begun = ready + content[:end], content[end:]
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+        raise unreadable(path, error) from None
     ready += begun + _decoded(path, decoder, b"", read, encoding).encode()
     if not ready.strip():
         raise empty_file(path.name)

@@ -14,11 +14,10 @@ from fogml.errors import InputError, counted, quoted
 from fogml.readers import plain_path
 from fogml.runs.columns import conversion, is_temperature
 from fogml.runs.container_files import container_columns
-from fogml.runs.findings import Finding
 from fogml.runs.logger_lines import FaultyFields
 from fogml.runs.logger_text import LoggerTable, read_logger_text
-from fogml.runs.opening import Opened, opened
-from fogml.runs.other_rate import interpolated, is_held
+from fogml.runs.opening import opened
+from fogml.runs.other_rate import is_held
 from fogml.runs.profile_parts import (
     ImportColumn,
     JoinedLog,
@@ -32,11 +31,6 @@ from fogml.runs.profile_schema import ImportProfile
 from fogml.runs.stamps import Stamps
 from fogml.signals import large
 
-__all__ = [
-    "chosen_rows", "internal", "interpolated", "is_held", "joined_columns", "read_logger", "rows_of_leg",
-    "seconds_from_first",
-]  # fmt: skip
-
 
 def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
     """The source columns of a logger's file, a text or a container that a reader knows.
@@ -46,9 +40,8 @@ def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
     InputError
         If the file does not fit the layout.
     """
-    file = opened(path) if path.is_file() and path.stat().st_size else Opened("csv", path)
-    kind = file.kind
-    if kind == "csv":
+    file = opened(path)
+    if file.kind == "csv":
         try:
             table = read_logger_text(file.path, layout, name)
         except FaultyFields as faulty:
@@ -59,7 +52,7 @@ def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
     if layout.text_sources:
         raise InputError(f"{path.name}: texts and stamps are read from text files; name columns of numbers")
     held = {column.number for name, column in layout.columns.items() if is_held(name)}
-    columns, findings = container_columns(path, kind, layout.sources, layout.clock, held)
+    columns, findings = container_columns(path, file.kind, layout.sources, layout.clock, held)
     count = len(next(iter(columns.values())))
     return LoggerTable(columns, np.arange(count), count, findings)
 
@@ -76,10 +69,8 @@ def chosen_rows(table: LoggerTable, profile: TextLayout) -> LoggerTable:
     for rule in profile.where:
         inside = matching(table, rule)
         if not inside.all():
-            lost = int(np.count_nonzero(~inside))
-            message = f"{counted(lost, 'row')} left out by 'where' of {quoted(str(rule.source))}"
-            row = int(table.rows[np.argmin(inside)]) + 1
-            table = table.kept(inside, Finding("rejected_rows", message, row=row, count=lost))
+            words = f"left out by 'where' of {quoted(str(rule.source))}"
+            table = table.kept(inside, table.rejected(~inside, words))
     for name, column in profile.columns.items():
         for source in profile.sources_of(name) if column.missing else ():
             if source in table.columns:
@@ -91,18 +82,16 @@ def _without_none(table: LoggerTable, profile: TextLayout, name: str, source: So
     """The table without the values of a source that stand for none in a column of the run."""
     values = table.columns[source]
     none = _is_one_of(values, profile.columns[name].missing)
-    lost = int(np.count_nonzero(none))
-    if lost == 0:
+    if not none.any():
         return table
-    row = int(table.rows[np.argmax(none)]) + 1
-    if is_temperature(name) and lost < len(none):
-        verb = "stands" if lost == 1 else "stand"
-        message = f"{counted(lost, 'value')} of {quoted(str(source))} {verb} for none: interpolated"
-        table = table.kept(slice(None), Finding("sentinel", message, column=name, row=row, count=lost))
+    found = table.rejected(none, f"in which {quoted(str(source))} stands for none left out")
+    if is_temperature(name) and not none.all():
+        verb = "stands" if found.count == 1 else "stand"
+        message = f"{counted(found.count, 'value')} of {quoted(str(source))} {verb} for none: interpolated"
+        table = table.kept(slice(None), replace(found, code="sentinel", message=message, column=name))
         filled = _bridged(values, none, _clock(table, profile))
         return replace(table, columns={**table.columns, source: filled})
-    message = f"{counted(lost, 'row')} in which {quoted(str(source))} stands for none left out"
-    return table.kept(~none, Finding("rejected_rows", message, row=row, count=lost))
+    return table.kept(~none, found)
 
 
 def _is_one_of(values: FloatArray, numbers: Sequence[float]) -> BoolArray:

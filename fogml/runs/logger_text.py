@@ -69,6 +69,12 @@ class LoggerTable:
     seconds: FloatArray | None = None
     stamps: Stamps | None = None
 
+    def rejected(self, rows: BoolArray, words: str) -> Finding:
+        """What is said of rows that are left out, shape (n,): how many they are, and words of why."""
+        count = int(np.count_nonzero(rows))
+        row = int(self.rows[np.argmax(rows)]) + 1
+        return Finding("rejected_rows", f"{counted(count, 'row')} {words}", row=row, count=count)
+
     def kept(self, rows: BoolArray | slice, finding: Finding) -> LoggerTable:
         """The table of some of its rows, with what is said of the others."""
         return replace(
@@ -82,10 +88,7 @@ class LoggerTable:
 
 
 def read_logger_text(
-    path: str | Path,
-    profile: TextLayout,
-    profile_name: str,
-    part_bytes: int = PART_BYTES,
+    path: Path, profile: TextLayout, profile_name: str, part_bytes: int = PART_BYTES
 ) -> LoggerTable:
     """Read the source columns of a logger's text file.
 
@@ -98,7 +101,7 @@ def read_logger_text(
         If the file is missing, is no text of that encoding, is not of the profile's form, or
         holds faulty rows that the profile does not reject; the message names file and line.
     """
-    parts = text_parts(path := Path(path), profile.encoding, part_bytes)
+    parts = text_parts(path, profile.encoding, part_bytes)
     first = next(parts)
     cut = cut_line(CsvSource(path), profile.text_separator, profile.decimal)
     if cut is not None and not profile.reject.not_numbers:
@@ -219,10 +222,8 @@ class _Reader:
             places[source] = found[0]
         for source, place in places.items():
             if place >= fields:
-                told = (
-                    f"source {quoted(source)} is column {place} counted from 0, and a row has {fields} fields"
-                )
-                raise InputError(f"{self.file}: {told}; {self.hint}")
+                told = f"source {quoted(source)} is column {place} counted from 0"
+                raise InputError(f"{self.file}: {told}, and a row has {fields} fields; {self.hint}")
         return places
 
     def _table(

@@ -19,15 +19,13 @@ from fogml.runs.findings import Finding
 from fogml.runs.logger_rows import (
     chosen_rows,
     internal,
-    interpolated,
-    is_held,
     joined_columns,
     read_logger,
     rows_of_leg,
     seconds_from_first,
 )
 from fogml.runs.logger_text import LoggerTable
-from fogml.runs.other_rate import held_beyond
+from fogml.runs.other_rate import held_beyond, interpolated, is_held
 from fogml.runs.possible import Rows, small_shares
 from fogml.runs.profile_parts import LeadingJump
 from fogml.runs.profile_schema import ImportProfile, load_profile, profile_names
@@ -235,13 +233,8 @@ def _leg(
         return slice(None), ()
     inside = {name: rows_of_leg(table, profile, name, file) for name in profile.legs}
     outside = ~np.any(list(inside.values()), axis=0)
-    findings: tuple[Finding, ...] = ()
-    if outside.any():
-        count = int(np.count_nonzero(outside))
-        message = f"{counted(count, 'row')} of the file in no leg left out"
-        row = int(table.rows[np.argmax(outside)]) + 1
-        findings = (Finding("rejected_rows", message, row=row, count=count),)
-    return inside[leg], findings
+    found = (table.rejected(outside, "of the file in no leg left out"),) if outside.any() else ()
+    return inside[leg], found
 
 
 def _columns(

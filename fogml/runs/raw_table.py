@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 from fogml.arrays import FloatArray
@@ -180,6 +181,19 @@ def no_samples(file: str) -> InputError:
 def empty_file(file: str) -> InputError:
     """What to say of a file that holds nothing."""
     return InputError(f"{file}: the file is empty; a header and samples were expected, export it again")
+
+
+def no_text(file: str) -> InputError:
+    """What to say of a file that is no text, and of no other format."""
+    return InputError(
+        f"{file}: not a text file (it holds control characters); CSV was expected, as it is none of "
+        "Parquet, HDF5 and MATLAB"
+    )
+
+
+def unreadable(path: Path, error: OSError) -> InputError:
+    """What to say of a file that the system does not read."""
+    return InputError(f"{path.name}: cannot be read ({error.strerror or error}); copy it again")
 
 
 @dataclass(frozen=True)
