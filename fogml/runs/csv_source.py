@@ -36,17 +36,20 @@ class CsvSource:
     path
         The file.
     wide
-        Python's name of its encoding where that is UTF-16, which is read as UTF-8.
+        Python's name of its encoding where that is UTF-16 or stated; it is read as UTF-8 then.
     end
         Bytes of the file that hold its table; all of it for None.
     padded
         Whether zero bytes pad its fields; they are read as blanks.
+    is_strict
+        Whether bytes that are no text of its encoding are an error, of their place in the file.
     """
 
     path: Path
     wide: str | None = None
     end: int | None = None
     padded: bool = False
+    is_strict: bool = False
 
     @property
     def is_plain(self) -> bool:
@@ -154,7 +157,8 @@ class _Converted(io.RawIOBase):
         self.file = source.path.open("rb")
         self.left = source.stop
         self.padded = source.padded
-        self.decoder = codecs.getincrementaldecoder(source.wide)(errors="replace") if source.wide else None
+        errors = "strict" if source.is_strict else "replace"
+        self.decoder = codecs.getincrementaldecoder(source.wide)(errors) if source.wide else None
         self.ahead = b""
         self.begun = False
 
@@ -170,7 +174,12 @@ class _Converted(io.RawIOBase):
             part = self.file.read(min(_PART_BYTES, self.left))
             self.left = self.left - len(part) if part else 0
             if self.decoder is not None:
-                text = self.decoder.decode(part, final=self.left == 0)
+                before = self.file.tell() - len(part) - len(self.decoder.getstate()[0])
+                try:
+                    text = self.decoder.decode(part, final=self.left == 0)
+                except UnicodeDecodeError as error:
+                    error.start += before
+                    raise
                 part = (text if self.begun else text.removeprefix("\ufeff")).encode()
                 self.begun = True
             self.ahead = part.replace(b"\0", b" ") if self.padded else part

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from fogml.arrays import FloatArray, IndexArray
 from fogml.arrow_arrays import takes_threads, values_of
 from fogml.errors import InputError, counted, quoted
-from fogml.runs.csv_source import is_binary
+from fogml.runs.csv_source import CsvSource, is_binary
 from fogml.runs.frames import frames_checked
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.raw_table import empty_file, no_text, unreadable
@@ -29,21 +28,16 @@ PART_BYTES = 1 << 23
 def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[bytes, bool]]:
     """Parts of a text, and whether each is the last one."""
     ready = begun = b""
-    read = 0
-    only_returns = False
-    decoder = codecs.getincrementaldecoder(encoding)()
+    only_returns = None
     try:
-        with path.open("rb") as file:
-            while raw := file.read(part_bytes):
-                text = _decoded(path, decoder, raw, read, encoding)
-                if read == 0:
-                    text = text.removeprefix("\ufeff")
-                    if is_binary(text[:4096]):
+        with CsvSource(path, encoding, is_strict=True).open() as file:
+            while content := file.read(part_bytes):
+                if only_returns is None:
+                    if is_binary(content[:4096].decode(errors="ignore")):
                         raise no_text(path.name)
-                    only_returns = "\r" in text and "\n" not in text
-                text = (text.replace("\r", "\n") if only_returns else text).replace("\0", " ")
-                read += len(raw)
-                content = begun + text.encode()
+                    only_returns = b"\r" in content and b"\n" not in content
+                content = content.replace(b"\r", b"\n") if only_returns else content
+                content = begun + content.replace(b"\0", b" ")
                 end = content.rfind(b"\n") + 1
                 if end and ready.strip():
                     yield ready, False
@@ -51,22 +45,16 @@ def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[byt
                 ready, begun = ready + content[:end], content[end:]
     except OSError as error:
         raise unreadable(path, error) from None
-    ready += begun + _decoded(path, decoder, b"", read, encoding).encode()
-    if not ready.strip():
-        raise empty_file(path.name)
-    yield ready, True
-
-
-def _decoded(path: Path, decoder: codecs.IncrementalDecoder, raw: bytes, read: int, encoding: str) -> str:
-    before = read - len(decoder.getstate()[0])
-    try:
-        return decoder.decode(raw, final=not raw)
     except UnicodeError as error:
-        place = f"byte {before + error.start}" if isinstance(error, UnicodeDecodeError) else "it"
+        place = f"byte {error.start}" if isinstance(error, UnicodeDecodeError) else "it"
         raise InputError(
             f"{path.name}: {place} is no {encoding} text; "
             "give the file's encoding in the profile (key 'encoding')"
         ) from None
+    ready += begun
+    if not ready.strip():
+        raise empty_file(path.name)
+    yield ready, True
 
 
 _LINE_STAMP = r"(?m)^[\[(<]?((?:[\d/.\-]+[ T])?\d{1,2}:\d\d:\d\d(?:[.:]\d+)?)"
