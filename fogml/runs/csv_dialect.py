@@ -160,7 +160,7 @@ def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
 
 
 def decoded_head(path: Path) -> tuple[str, str]:
-    """The first lines of a text file, and its encoding.
+    """The first lines of a text file, each with a newline, and its encoding.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def decoded_head(path: Path) -> tuple[str, str]:
     if is_binary(head[:1000].decode("latin-1")):
         raise no_text(path.name)
     encoding = encoding_of(head, len(head) == HEAD_BYTES)
-    text = head.decode(encoding, errors="replace")
+    text = LINE_END.sub("\n", head.decode(encoding, errors="replace"))
     # A line that the head cuts is left out.
     return text if len(head) < HEAD_BYTES else text[: text.rfind("\n") + 1], source.wide or encoding
 

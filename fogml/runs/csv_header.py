@@ -221,19 +221,14 @@ def is_number_like(field: str) -> bool:
 def _header(lines: Sequence[str], i: int, separator: str | None) -> Header:
     text = uncommented(lines[i])
     separator = separator or _separator(text, lines[i + 1 : i + 1 + _LINES_BELOW])
-    cells = _cells(_merged(lines, i, fields_of(text, separator), separator))
+    above = fields_of(uncommented(lines[i - 1]), separator) if i else []
+    cells = _cells(with_cells_above(fields_of(text, separator), above))
     below = next((j for j in range(i + 1, len(lines)) if lines[j].strip()), None)
     if below is not None:
         units = with_units_below(cells, fields_of(uncommented(lines[below]), separator))
         if units is not None:
             return Header(i, below + 1, separator, units)
     return Header(i, i + 1, separator, canonical_cells(cells))
-
-
-def _merged(lines: Sequence[str], i: int, fields: list[str], separator: str) -> list[str]:
-    """The fields of a line; where one has no text, that above, as of cells merged over two rows."""
-    above = fields_of(uncommented(lines[i - 1]), separator) if i and not all(map(str.strip, fields)) else []
-    return with_cells_above(fields, above)
 
 
 def _separator(header: str, below: Sequence[str]) -> str:

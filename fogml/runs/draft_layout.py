@@ -84,7 +84,9 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
         data, is_broken = begin, is_broken or begin < data
     if header is None or header.is_by_place:
         # A name would be of none of its columns, or of several.
-        cells = [f"column {i}" for i in range(width)] if header is None else header.known
+        cells = [f"column {i}" for i in range(width)]
+        if header is not None:
+            cells = [right for _, right in header.cells]
         layout += [f"skip_lines: {data}"] if data else []
         layout += ["header: false", f"fields: {width}"]
         fields = [Field(i, *parse_header(cell)) for i, cell in enumerate(cells)]
@@ -126,11 +128,6 @@ class _Header:
     cells: list[tuple[str, str]]
     with_units: bool = False
     is_by_place: bool = False
-
-    @property
-    def known(self) -> list[str]:
-        """The header cells as the run format spells them."""
-        return [right for _, right in self.cells]
 
     @classmethod
     def above(cls, lines: Sequence[str], data: int, width: int, mark: str | None) -> _Header | None:
@@ -228,7 +225,7 @@ def _is_blank(line: str, mark: str | None) -> bool:
 
 def _lines(text: str) -> list[str]:
     """The lines of a text, but for the last one, which may be cut."""
-    return LINE_END.split(text)[:-1] or [text]
+    return text.split("\n")[:-1] or [text]
 
 
 def _first_of_rows(is_data: Sequence[bool], is_filled: Sequence[bool]) -> int | None:

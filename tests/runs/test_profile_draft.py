@@ -467,6 +467,12 @@ def test_what_ends_a_date_is_no_text_of_a_device(tmp_path, after):
     np.testing.assert_allclose(run.columns["T"], 20.5 + 0.1 * np.arange(COUNT))
 
 
+def test_a_long_file_whose_lines_end_with_carriage_returns_is_drafted(tmp_path):
+    rows = "".join(f"{i},{9.5 + i % 7},{20 + i % 3}\r" for i in range(6000))
+    (tmp_path / "log.csv").write_bytes(f"tick,omega,die\r{rows}".encode())
+    assert "source: omega" in draft_profile(tmp_path / "log.csv")
+
+
 def test_the_first_rows_of_counts_are_in_counts(tmp_path):
     rows = "".join(f"{i},{1000 + i % 7}\n" for i in range(COUNT))
     (tmp_path / "log.csv").write_text("time [s],gyro [count]\n" + rows)
