@@ -159,8 +159,8 @@ def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
     return replace(dialect, text=frozenset(text))
 
 
-def decoded_head(path: Path) -> tuple[str, str]:
-    """The first lines of a text file, each with a newline, and its encoding.
+def decoded_head(path: Path) -> tuple[str, str, CsvSource]:
+    """The first lines of a text file, each with a newline, its encoding, and where it is.
 
     Raises
     ------
@@ -173,7 +173,8 @@ def decoded_head(path: Path) -> tuple[str, str]:
     encoding = encoding_of(head, len(head) == HEAD_BYTES)
     text = LINE_END.sub("\n", head.decode(encoding, errors="replace"))
     # A line that the head cuts is left out.
-    return text if len(head) < HEAD_BYTES else text[: text.rfind("\n") + 1], source.wide or encoding
+    text = text if len(head) < HEAD_BYTES else text[: text.rfind("\n") + 1]
+    return text, source.wide or encoding, source
 
 
 def text_of(path: Path) -> str:
@@ -184,8 +185,7 @@ def text_of(path: Path) -> str:
     InputError
         If it is no text.
     """
-    decoded_head(path)
-    source, *_ = csv_source(path)
+    *_, source = decoded_head(path)
     with source.open() as opened:
         content = opened.read()
     return content.decode(encoding_of(content, cut=False), errors="replace")

@@ -56,7 +56,7 @@ class Field:
 
 def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] | None]:
     """The layout's keys, the fields of a text file, and what is said above them of the interval [s]."""
-    head, encoding = decoded_head(path)
+    head, encoding, source = decoded_head(path)
     last = head.splitlines()[-MOST_ROWS:]
     stamp, has_sums = mark_of_line_stamps(last), 2 * sum(map(is_frame, last)) > len(last)
     head = frames_checked(head.encode()).decode() if has_sums else head
@@ -68,7 +68,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
     width = len(rows[0])
     numeric = _numeric(rows, width)
     rows = [row for row in rows if _is_data(row, width, numeric)]
-    marks = marks_of(CsvSource(path), rows, mark or " ")
+    marks = marks_of(source, rows, mark or " ")
     layout = [f"line_stamp: {as_yaml(stamp)}"] if stamp is not None else []
     doubt = f"    # GUESS: {marks.doubt.partition(';')[0]}" if marks.doubt else ""
     is_stated = marks.decimal != "." or doubt
@@ -97,7 +97,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
             told = as_yaml(lines[header.line].strip()[:60])
             layout.append(f"header_text: {told}    # the header is the first line that holds this")
         fields = [Field(cell.strip(' "'), *parse_header(right)) for cell, right in header.cells]
-    below = is_broken or _are_below(path, encoding, mark, rows, stamp, has_sums)
+    below = is_broken or _are_below(source, mark, rows, stamp, has_sums)
     with_units = header is not None and header.with_units and not header.is_by_place
     if with_units or below:
         keys = ["not_numbers: true", *(["wrong_field_count: true"] if below else [])]
@@ -168,16 +168,10 @@ def _are_names(cells: Sequence[str]) -> bool:
 
 
 def _are_below(
-    path: Path,
-    encoding: str,
-    mark: str | None,
-    rows: Sequence[Sequence[str]],
-    stamp: str | None,
-    has_sums: bool,
+    source: CsvSource, mark: str | None, rows: Sequence[Sequence[str]], stamp: str | None, has_sums: bool
 ) -> bool:
     """Whether lines other than of numbers stand below them, or such as lack one that every row has."""
-    wide = encoding if encoding.startswith("utf-16") else None
-    tail = CsvSource(path, wide).tail(_TAIL_BYTES).decode(errors="replace").rstrip("\0")
+    tail = source.tail(_TAIL_BYTES).decode(errors="replace")
     tail = frames_checked(tail.encode()).decode() if has_sums else tail
     tail = tail if stamp is None else stamp_apart(tail, stamp, mark)
     lines = [fields_of(line, mark) for line in LINE_END.split(tail)[1:] if line.strip()]
