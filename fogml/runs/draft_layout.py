@@ -25,9 +25,8 @@ from fogml.runs.csv_header import (
     with_cells_above,
 )
 from fogml.runs.csv_source import LINE_END, PLAIN, CsvSource, Marks, marks_of, number
-from fogml.runs.frames import frames_checked, is_frame
 from fogml.runs.header_spelling import canonical_cells, uncommented, with_units_below
-from fogml.runs.logger_lines import mark_of_line_stamps, stamp_apart
+from fogml.runs.logger_lines import frames_checked, is_frame, mark_of_line_stamps, stamp_apart
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.yaml_text import parse_yaml
 

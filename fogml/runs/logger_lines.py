@@ -16,7 +16,6 @@ from fogml.arrays import FloatArray, IndexArray
 from fogml.arrow_arrays import takes_threads, values_of
 from fogml.errors import InputError, counted, quoted
 from fogml.runs.csv_source import CsvSource, is_binary
-from fogml.runs.frames import frames_checked
 from fogml.runs.profile_parts import TextLayout
 from fogml.runs.raw_table import empty_file, no_text, unreadable
 from fogml.runs.stamp_forms import stamp_form
@@ -67,6 +66,32 @@ _AFTER_STAMP = re.compile(
 def stamp_apart(text: str, mark: str, separator: str | None) -> str:
     """A text whose lines' stamps, which end before `mark`, are fields of their own."""
     return re.sub(_LINE_STAMP + re.escape(mark), lambda found: found[1] + (separator or "\t"), text)
+
+
+_FRAME = re.compile(rb"\$([^$*\n]*)\*([0-9A-Fa-f]{2})[ \t\r]*\Z")
+"""A frame of text with its sum, as NMEA 0183 has them: ``$PGYRO,1,9.6*5B``."""
+
+
+def is_frame(line: str) -> bool:
+    """Whether a line ends as a frame of NMEA 0183 does: a ``$``, what is told, a ``*`` and its sum."""
+    return "$" in line and frames_checked(line.encode()) != b"*"
+
+
+def frames_checked(content: bytes) -> bytes:
+    """Lines with a ``$`` without the sum at their end; those whose sum is wrong or lost as ``*`` alone.
+
+    It is the exclusive or of all bytes between ``$`` and ``*`` (NMEA 0183).
+    """
+    sums = np.bitwise_xor.accumulate(np.frombuffer(content, dtype=np.uint8))
+
+    def checked(line: re.Match[bytes]) -> bytes:
+        found = _FRAME.search(line[0])
+        if found is None:
+            return b"*"
+        before, last = (line.start() + place - 1 for place in found.span(1))
+        return line[0][: found.end(1)] if sums[before] ^ sums[last] == int(found[2], 16) else b"*"
+
+    return re.sub(rb"(?m)^.*\$.*$", checked, content)
 
 
 def plain_lines(content: bytes, layout: TextLayout) -> bytes:
