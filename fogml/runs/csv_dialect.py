@@ -36,16 +36,16 @@ class CsvDialect:
     ----------
     source
         Where its bytes are.
-    separator, decimal, encoding
+    separator, encoding
         As Python's `csv` and `open` take them.
+    marks
+        How its numbers are written.
     header_line
         Line of the header, counted from 1.
     skipped_lines
         Lines before the data: the header's, and a row of units below it.
     cells
         Header cells in order, spelled as in the run format.
-    grouped
-        Whether marks of thousands are within numbers.
     stamps
         The clock, where times are dates and times of day.
     blanks
@@ -54,23 +54,19 @@ class CsvDialect:
         Positions of columns unknown to the run format that hold text.
     unwanted
         Positions of other columns that are not read.
-    doubt
-        What is to be said of the marks in its numbers.
     """
 
     source: CsvSource
     separator: str
-    decimal: str
+    marks: Marks
     encoding: str
     header_line: int
     skipped_lines: int
     cells: tuple[str, ...]
-    grouped: bool = False
     stamps: Stamps | None = None
     blanks: int = 0
     text: frozenset[int] = frozenset()
     unwanted: frozenset[int] = frozenset()
-    doubt: str | None = None
 
     @cached_property
     def stamp_places(self) -> tuple[int, ...]:
@@ -104,7 +100,7 @@ class CsvDialect:
 
     def value(self, field: str) -> float | None:
         """As `number`, by this dialect's marks."""
-        return number(field, self.decimal, self.grouped)
+        return number(field, self.marks.decimal, self.marks.grouped)
 
 
 def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
@@ -143,15 +139,13 @@ def csv_dialect(path: Path, seconds: Collection[int] = ()) -> CsvDialect:
     dialect = CsvDialect(
         source,
         header.separator,
-        marks.decimal,
+        marks,
         encoding,
         header.line + 1,
         header.data,
         cells,
-        marks.grouped,
         stamps,
         _blanks(rows[0], len(cells)) if rows else 0,
-        doubt=marks.doubt,
     )
     _check_header(path.name, dialect, rows[0] if rows else [])
     unknown = set(range(len(cells))) - dialect.known - set(dialect.stamp_places)
@@ -217,18 +211,15 @@ def _clock(
     if stamps is None:
         return cells, None
     place = stamps.columns[-1][0]
-    if (fractions := _fractions(rows, len(cells), place)) is not None:
-        whole, form = stamps.columns[-1]
-        begin = replace(stamps, first_ns=stamps.first_ns + fractions)
-        columns = (*stamps.columns[:-1], (whole, form), (whole + 1, StampForm(FRACTION)))
-        named = (*cells[:place], "time of day", "time [s]", *cells[place + 1 :])
-        return named, replace(begin, columns=tuple((i, f) for i, f in columns))
-    if (parts := _parts_of_seconds(cells, rows, place)) is not None:
-        first, digits = parts
-        columns = (*stamps.columns, (place + 1, StampForm(FRACTION, part_digits=digits)))
-        named = (*cells[:place], "time of day", "time [s]", *cells[place + 2 :])
-        return named, replace(stamps, columns=columns, first_ns=stamps.first_ns + first)
-    return (*cells[:place], "time [s]", *cells[place + 1 :]), stamps
+    before, behind = cells[:place], cells[place + 1 :]
+    if (part := _fractions(rows, len(cells), place)) is None:
+        if (part := _parts_of_seconds(cells, rows, place)) is None:
+            return (*before, "time [s]", *behind), stamps
+        behind = behind[1:]
+    first, digits = part
+    columns = (*stamps.columns, (place + 1, StampForm(FRACTION, part_digits=digits)))
+    with_parts = replace(stamps, columns=columns, first_ns=stamps.first_ns + first)
+    return (*before, "time of day", "time [s]", *behind), with_parts
 
 
 def _parts_of_seconds(
@@ -236,7 +227,8 @@ def _parts_of_seconds(
 ) -> tuple[int, int] | None:
     """The first row's part of a second [ns] where a column of them stands right of times of day; else None.
 
-    They are whole milliseconds, of as many digits, where its name says so, or decimals behind a point.
+    Also how many digits all have with zeros before them: 3 of whole milliseconds, where its name says so, and
+    0 of decimals behind a point, which need none.
     """
     names = {parse_header(cell)[0].lower() for cell in cells[place + 1 : place + 2]}
     texts = [row[place + 1].strip() for row in rows if len(row) >= len(cells) > place + 1]
@@ -248,8 +240,8 @@ def _parts_of_seconds(
     return None
 
 
-def _fractions(rows: Sequence[Sequence[str]], width: int, place: int) -> int | None:
-    """The first row's part of a second [ns] where a comma before it separates fields too; else None."""
+def _fractions(rows: Sequence[Sequence[str]], width: int, place: int) -> tuple[int, int] | None:
+    """As `_parts_of_seconds`, where the comma before a part separates fields too."""
     full = [row for row in rows if len(row) >= width]
     behind = [row[place + 1].strip() for row in full if len(row) > width]
     sizes = {len(field) if field.isdecimal() else 0 for field in behind}
@@ -257,7 +249,7 @@ def _fractions(rows: Sequence[Sequence[str]], width: int, place: int) -> int | N
         return None
     if not all(re.search(r":\d\d\Z", row[place].strip()) for row in full):
         return None
-    return int(behind[0]) * 10 ** (9 - size)
+    return int(behind[0]) * 10 ** (9 - size), 0
 
 
 def _stamps(cells: Sequence[str], rows: Sequence[Sequence[str]], decimal: str) -> Stamps | None:
@@ -284,7 +276,7 @@ def _blanks(row: Sequence[str], width: int) -> int:
 
 def _check_header(file: str, dialect: CsvDialect, row: Sequence[str]) -> None:
     """Refuse a file without a header, or whose fields blanks separate; `row` is its first one of data."""
-    between = [number(field, dialect.decimal) is not None for field in " ".join(row).split()]
+    between = [number(field, dialect.marks.decimal) is not None for field in " ".join(row).split()]
     if len(dialect.cells) == len(row) == 1 < len(between) and all(between):
         raise InputError(
             f"{file}: blanks between its fields, where commas, semicolons or tabs were expected; "

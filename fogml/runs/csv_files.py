@@ -80,7 +80,7 @@ def read_csv(path: Path, *, repair: bool, seconds: Collection[int] = ()) -> RawT
     except arrow.ArrowException:
         # Arrow is fast and strict; line by line tells where the fault is, or forgives it.
         whole = LineReader(path, dialect, repair).whole()
-    cut = cut_line(dialect.source, dialect.separator, dialect.decimal)
+    cut = cut_line(dialect.source, dialect.separator, dialect.marks.decimal)
     whole = whole.noting([*_doubts(dialect), *notes])
     if cut is None:
         return whole.noting([] if notes else note_of_end(dialect.source))
@@ -103,7 +103,7 @@ def csv_blocks(
 
     dialect, notes = without_footer(csv_dialect(path, seconds).only(columns))
     notes = [*_doubts(dialect), *(notes or note_of_end(dialect.source))]
-    if (cut := cut_line(dialect.source, dialect.separator, dialect.decimal)) is not None:
+    if (cut := cut_line(dialect.source, dialect.separator, dialect.marks.decimal)) is not None:
         raise cut_error(path, cut)
     start = 0
     clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
@@ -127,7 +127,8 @@ def csv_blocks(
 
 def _doubts(dialect: CsvDialect) -> list[Finding]:
     """What is to be said of the marks in a file's numbers."""
-    return [Finding("marks_of_thousands", dialect.doubt)] if dialect.doubt else []
+    doubt = dialect.marks.doubt
+    return [Finding("marks_of_thousands", doubt)] if doubt else []
 
 
 def _for_line_by_line(reason: str) -> Exception:
@@ -192,7 +193,7 @@ def _options(dialect: CsvDialect, skipped: int) -> dict[str, Any]:
             check_utf8=False,
             column_types={**kinds, **blanks},
             include_columns=[*kinds, *blanks],
-            decimal_point=dialect.decimal,
+            decimal_point=dialect.marks.decimal,
             null_values=[*spellings, "NaN", "-NaN"],
         ),
     }

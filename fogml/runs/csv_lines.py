@@ -194,7 +194,7 @@ class LineReader:
             text = fields[i]
             value = dialect.value(text)
             if value is None and i in dialect.known:
-                mark = "comma" if dialect.decimal == "," else "point"
+                mark = "comma" if dialect.marks.decimal == "," else "point"
                 what = f"is not a number (with a decimal {mark})"
                 if dialect.name(i) == "time" and ":" in text:
                     what = "is no date or time of day that is read, such as 2026-03-02T08:00:00+01:00"
