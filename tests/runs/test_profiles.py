@@ -170,8 +170,8 @@ def test_no_recording_at_all_is_refused(write, profile, content):
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    for path in (tmp_path / "absent.csv", tmp_path):
-        with pytest.raises(InputError, match="cannot be read"):
+    for path, told in ((tmp_path / "absent.csv", "no such file"), (tmp_path, "is a folder")):
+        with pytest.raises(InputError, match=told):
             import_recording(path, "cold-start-mpu6050")
 
 
