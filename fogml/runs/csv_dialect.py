@@ -22,10 +22,10 @@ from fogml.runs.csv_source import (
     number,
 )
 from fogml.runs.encodings import encoding_of
-from fogml.runs.header_spelling import DATE_NAMES, MILLISECOND_NAMES, PARTS_OF_A_SECOND
+from fogml.runs.header_spelling import DATE_NAMES
 from fogml.runs.raw_table import empty_file, no_text, wanted_cells
 from fogml.runs.stamp_forms import FRACTION, StampForm
-from fogml.runs.stamps import DECIMALS, MILLISECONDS, Stamps, stamps_of
+from fogml.runs.stamps import Stamps, part_of_a_second, stamps_of
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,9 @@ def _clock(
     place = stamps.columns[-1][0]
     before, behind = cells[:place], cells[place + 1 :]
     if (part := _fractions(rows, len(cells), place)) is None:
-        if (part := _parts_of_seconds(cells, rows, place)) is None:
+        name = parse_header(behind[0])[0] if behind else ""
+        texts = [row[place + 1] for row in rows if len(row) >= len(cells) > place + 1]
+        if (part := part_of_a_second(name, texts)) is None:
             return (*before, "time [s]", *behind), stamps
         behind = behind[1:]
     first, digits = part
@@ -222,26 +224,8 @@ def _clock(
     return (*before, "time of day", "time [s]", *behind), with_parts
 
 
-def _parts_of_seconds(
-    cells: Sequence[str], rows: Sequence[Sequence[str]], place: int
-) -> tuple[int, int] | None:
-    """The first row's part of a second [ns] where a column of them stands right of times of day; else None.
-
-    Also how many digits all have with zeros before them: 3 of whole milliseconds, where its name says so, and
-    0 of decimals behind a point, which need none.
-    """
-    names = {parse_header(cell)[0].lower() for cell in cells[place + 1 : place + 2]}
-    texts = [row[place + 1].strip() for row in rows if len(row) >= len(cells) > place + 1]
-    is_millisecond, is_part = names <= MILLISECOND_NAMES, all(map(PARTS_OF_A_SECOND.search, names))
-    for form, digits, is_named in ((MILLISECONDS, 3, is_millisecond), (DECIMALS, 0, is_part)):
-        fits = [bool(re.fullmatch(form, text)) for text in texts]
-        if is_named and fits and fits[0] and 2 * sum(fits) > len(fits):
-            return round(float(texts[0]) * (1e6 if digits else 1e9)), digits
-    return None
-
-
 def _fractions(rows: Sequence[Sequence[str]], width: int, place: int) -> tuple[int, int] | None:
-    """As `_parts_of_seconds`, where the comma before a part separates fields too."""
+    """As `part_of_a_second`, where the comma before a part separates fields too."""
     full = [row for row in rows if len(row) >= width]
     behind = [row[place + 1].strip() for row in full if len(row) > width]
     sizes = {len(field) if field.isdecimal() else 0 for field in behind}

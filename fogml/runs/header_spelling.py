@@ -19,12 +19,6 @@ from fogml.runs.columns import (
 
 DATE_NAMES = frozenset({"date", "datum", "日期"})
 """What a column of dates beside one of times of day is called."""
-MILLISECOND_NAMES = frozenset(
-    {"ms", "msec", "millis", "millisecond", "milliseconds", "millisekunden", "毫秒"}
-)
-"""What a column of milliseconds beside times of day is called."""
-PARTS_OF_A_SECOND = re.compile(r"sec|frac|milli|part|^ms|秒", re.IGNORECASE)
-"""In the name of a column of decimals of a second."""
 _OF_THE_GYRO = ("gyro", "fog", "coil", "sensor", "die", "imu")
 _WARM = ("temp", "temperature", "temperatur")
 _DATE_AND_TIME = (("date", "and", "time"), ("datum", "und", "zeit"), ("datum", "und", "uhrzeit"),

@@ -15,11 +15,11 @@ from fogml.runs.columns import column_spec, conversion, converted, is_accepted
 from fogml.runs.draft_container import container_fields
 from fogml.runs.draft_layout import Field, as_yaml, text_layout
 from fogml.runs.draft_words import AXIS, COUNT, DATE, GYRO, MULTIPLE, NO_OUTPUT, OWN, SET_POINT, TIME, WARM
-from fogml.runs.header_spelling import MILLISECOND_NAMES, PARTS_OF_A_SECOND, face_of
+from fogml.runs.header_spelling import face_of
 from fogml.runs.opening import opened
 from fogml.runs.possible import digits_of_clock
 from fogml.runs.stamp_forms import stamp_form
-from fogml.runs.stamps import DECIMALS, PARTS, stamps_of_parts
+from fogml.runs.stamps import PARTS, part_of_a_second, stamps_of_parts
 
 _UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
 _UNITS = {unit: conversion("time", unit, "")[0] for unit in ("s", "ms", "us", "ns")}
@@ -188,7 +188,7 @@ def _clock(left: list[Field]) -> list[str]:
         whole = [f for f, kind in stamped if kind.startswith("date and")]
         parts = [[f for f, kind in stamped if (kind == "date") is is_date][:1] for is_date in (True, False)]
         used = whole[:1] or [f for part in parts for f in part]
-        used += _taken(left, _holds_parts_of_seconds)[:1]
+        used += _taken(left, lambda f: part_of_a_second(f.name, f.first) is not None)[:1]
         shown = [as_yaml(f.source) for f in used]
         timed = [f for f in left if _grows(f) and f.unit is not None and is_accepted("time", f.unit)]
         others = ", ".join(as_yaml(f.source) for f in (*(f for f, _ in stamped), *timed) if f not in used)
@@ -229,14 +229,6 @@ def _clock(left: list[Field]) -> list[str]:
         step = f"steps of {apart:.6g}{f': {lasts}{ms}' if ms or unit != 's' else ''}; "
     line = f"  time: {{source: {as_yaml(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"
     return [_entry(line, one)]
-
-
-def _holds_parts_of_seconds(one: Field) -> bool:
-    """Whether a field holds milliseconds by its name, or decimals behind a point alone."""
-    if not one.first or not PARTS_OF_A_SECOND.search(one.name):
-        return False
-    decimals = (re.fullmatch(DECIMALS, text.strip(' "')) for text in one.first)
-    return one.name.lower() in MILLISECOND_NAMES or all(decimals)
 
 
 def _is_in_digits(one: Field) -> bool:

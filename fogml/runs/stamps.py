@@ -30,8 +30,10 @@ if TYPE_CHECKING:
 
 
 _OPEN_DATES = {"?": "day and month", "y?": "day and year"}
-MILLISECONDS, DECIMALS = r"\d{1,3}", r"\.\d{1,9}"
-"""What stands in a column of parts of a second."""
+_MILLISECONDS, _DECIMALS = r"\d{1,3}", r"\.\d{1,9}"
+_OF_MILLISECONDS = {"ms", "msec", "millis", "millisecond", "milliseconds", "millisekunden", "毫秒"}
+_OF_DECIMALS = re.compile(r"sec|frac|milli|part|^ms|秒", re.IGNORECASE)
+"""In names of columns of parts of a second beside times of day."""
 PARTS = 6
 """Columns of a clock that has one for each of year, month, day, hour, minute and second."""
 
@@ -145,19 +147,35 @@ def stamps_of(
     return Stamps(known, first, any(match is not None and match.groupdict().get("z") for match in shown))
 
 
+def part_of_a_second(name: str, texts: Sequence[str]) -> tuple[int, int] | None:
+    """The first part of a second [ns] of a column beside times of day; None where it holds none.
+
+    Also how many digits all have with zeros before them: 3 of whole milliseconds, where its name says so, and
+    0 of decimals behind a point, which need none.
+    """
+    is_millisecond, is_part = name.lower() in _OF_MILLISECONDS, _OF_DECIMALS.search(name)
+    for form, digits, is_named in ((_MILLISECONDS, 3, is_millisecond), (_DECIMALS, 0, is_part)):
+        fits = [bool(re.fullmatch(form, text.strip(' "'))) for text in texts]
+        if is_named and fits and fits[0] and 2 * sum(fits) > len(fits):
+            return round(float(texts[0].strip(' "')) * (1e6 if digits else 1e9)), digits
+    return None
+
+
 def whole_stamps(columns: list[list[str]]) -> list[list[str]]:
     """Texts of stamps, n of each column: of six their parts, of up to three the last may be milliseconds."""
     if len(columns) == PARTS:
         return [stamps_of_parts(columns)]
     *before, last = columns
     first = [text.strip() for text in last[:_FIRST_ROWS]]
-    fits = {kind: sum(bool(re.fullmatch(kind, text)) for text in first) for kind in (MILLISECONDS, DECIMALS)}
+    fits = {
+        kind: sum(bool(re.fullmatch(kind, text)) for text in first) for kind in (_MILLISECONDS, _DECIMALS)
+    }
     kind = max(fits, key=lambda one: fits[one])
     if not before or 2 * fits[kind] <= len(first):
         return columns
     # What is no part of a second makes no stamp.
     parts = (part.strip().lstrip(".") if re.fullmatch(kind, part.strip()) else "?" for part in last)
-    digits = 3 if kind == MILLISECONDS else 0
+    digits = 3 if kind == _MILLISECONDS else 0
     stamps = [f"{text.strip()}.{part.zfill(digits)}" for text, part in zip(before[-1], parts, strict=True)]
     return [*before[:-1], stamps]
 
