@@ -26,7 +26,7 @@ from fogml.runs.csv_header import (
 )
 from fogml.runs.csv_source import LINE_END, PLAIN, CsvSource, Marks, marks_of, number
 from fogml.runs.header_spelling import canonical_cells, uncommented, with_units_below
-from fogml.runs.logger_lines import frames_checked, is_frame, mark_of_line_stamps, stamp_apart
+from fogml.runs.logger_lines import is_frame, mark_of_line_stamps, plain_lines
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.yaml_text import parse_yaml
 
@@ -58,8 +58,7 @@ def text_layout(path: Path) -> tuple[list[str], list[Field], tuple[str, float] |
     head, encoding, source = decoded_head(path)
     last = head.splitlines()[-MOST_ROWS:]
     stamp, has_sums = mark_of_line_stamps(last), 2 * sum(map(is_frame, last)) > len(last)
-    head = frames_checked(head.encode()).decode() if has_sums else head
-    name, lines, data, is_broken = _table_of(head, stamp)
+    name, lines, data, is_broken = _table_of(head, stamp, has_sums)
     mark = SEPARATORS[name]
     if data is None:
         raise InputError(f"{path.name}: no rows of numbers in its first lines; a draft needs some")
@@ -171,8 +170,7 @@ def _are_below(
 ) -> bool:
     """Whether lines other than of numbers stand below them, or such as lack one that every row has."""
     tail = source.tail(_TAIL_BYTES).decode(errors="replace")
-    tail = frames_checked(tail.encode()).decode() if has_sums else tail
-    tail = tail if stamp is None else stamp_apart(tail, stamp, mark)
+    tail = plain_lines(tail.encode(), stamp, mark, has_sums).decode()
     lines = [fields_of(line, mark) for line in LINE_END.split(tail)[1:] if line.strip()]
     width = len(rows[0])
     # Of a short file the last of them are those that stand below.
@@ -182,7 +180,7 @@ def _are_below(
     return any(len(f) != width or not all(is_number_like(f[i]) for i in held) for f in lines)
 
 
-def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None, bool]:
+def _table_of(text: str, stamp: str | None, has_sums: bool) -> tuple[str, list[str], int | None, bool]:
     """The separator's name, the lines, the first line of numbers, and whether other lines stand below it."""
     best: tuple[tuple[float, float], str, list[str], int | None, bool]
     best = (0.0, 0.0), "comma", _lines(text), None, False
@@ -190,7 +188,7 @@ def _table_of(text: str, stamp: str | None) -> tuple[str, list[str], int | None,
     for name, mark in SEPARATORS.items():
         if labview is not None and mark != labview.separator:
             continue
-        lines = _lines(text if stamp is None else stamp_apart(text, stamp, mark))
+        lines = _lines(plain_lines(text.encode(), stamp, mark, has_sums).decode())
         rows = [fields_of(line, mark) for line in lines[-MOST_ROWS:] if line.strip()]
         counts = [len(row) for row in rows]
         width = max(set(counts), key=counts.count) if counts else 0

@@ -63,11 +63,6 @@ _AFTER_STAMP = re.compile(
 """No sign is part of it: a blank or a bracket ends it, and no zone's name is a device's text."""
 
 
-def stamp_apart(text: str, mark: str, separator: str | None) -> str:
-    """A text whose lines' stamps, which end before `mark`, are fields of their own."""
-    return re.sub(_LINE_STAMP + re.escape(mark), lambda found: found[1] + (separator or "\t"), text)
-
-
 _FRAME = re.compile(rb"\$([^$*\n]*)\*([0-9A-Fa-f]{2})[ \t\r]*\Z")
 """A frame of text with its sum, as NMEA 0183 has them: ``$PGYRO,1,9.6*5B``."""
 
@@ -94,11 +89,12 @@ def frames_checked(content: bytes) -> bytes:
     return re.sub(rb"(?m)^.*\$.*$", checked, content)
 
 
-def plain_lines(content: bytes, layout: TextLayout) -> bytes:
-    """A part of a text with its lines' stamps as fields of their own and sums checked, as the layout says."""
-    if layout.line_stamp is not None:
-        content = stamp_apart(content.decode(), layout.line_stamp, layout.text_separator).encode()
-    return frames_checked(content) if layout.checksum else content
+def plain_lines(content: bytes, stamp: str | None, separator: str | None, has_sums: bool) -> bytes:
+    """Lines with their stamps, which end before the mark `stamp`, as fields of their own, sums checked."""
+    if stamp is not None:
+        form, apart = _LINE_STAMP + re.escape(stamp), separator or "\t"
+        content = re.sub(form, lambda found: found[1] + apart, content.decode()).encode()
+    return frames_checked(content) if has_sums else content
 
 
 def mark_of_line_stamps(lines: Sequence[str]) -> str | None:

@@ -127,8 +127,10 @@ class _Reader:
         rows, seconds = large.Growing(np.intp), large.Growing()
         texts: dict[str | int, list[NDArray[np.str_]]] = {}
         fields, places = 0, dict[str | int, int]()
+        separator = self.profile.text_separator
         for content, is_last in parts:
-            lines = Lines.of(hide_quoted(plain_lines(content, self.profile), self.profile.text_separator))
+            content = plain_lines(content, self.profile.line_stamp, separator, self.profile.checksum)
+            lines = Lines.of(hide_quoted(content, separator))
             is_first = self.lines_before == 0
             numbers = np.flatnonzero(self._used(lines, is_first))
             if is_first:
@@ -153,6 +155,9 @@ class _Reader:
             None if self.clock is None else self.clock.stamps,
         )
 
+    def _refused(self, told: str) -> InputError:
+        return InputError(f"{self.file}: {told}; {self.hint}")
+
     def _line(self, lines: Lines, number: int) -> str:
         """A line as it stands in the file."""
         return shown(lines.line(number), self.profile.text_separator)
@@ -165,16 +170,11 @@ class _Reader:
         if first:
             self._check_signature(lines)
             used[: profile.skip_lines] = False
-            if profile.header_text is not None:
-                found = (
-                    n for n in np.flatnonzero(used).tolist() if profile.header_text in self._line(lines, n)
-                )
+            if (text := profile.header_text) is not None:
+                found = (n for n in np.flatnonzero(used).tolist() if text in self._line(lines, n))
                 header = next(found, None)
                 if header is None:
-                    raise InputError(
-                        f"{self.file}: no line holds the header's text {quoted(profile.header_text)}; "
-                        f"{self.hint}"
-                    )
+                    raise self._refused(f"no line holds the header's text {quoted(text)}")
                 used[:header] = False
         if profile.comment is not None:
             begins = mark == profile.comment.encode(errors="replace")[0]
@@ -188,8 +188,7 @@ class _Reader:
         if signature is not None:
             head = [self._line(lines, number) for number in range(min(_SIGNATURE_LINES, len(lines.starts)))]
             if not any(signature in line for line in head):
-                told = f"{quoted(signature)} was expected in its first lines"
-                raise InputError(f"{self.file}: {told}; {self.hint}")
+                raise self._refused(f"{quoted(signature)} was expected in its first lines")
 
     def _head(self, lines: Lines, numbers: IndexArray) -> tuple[IndexArray, int, dict[str | int, int]]:
         """The lines of data below the header, the fields of a row, and where each source stands."""
@@ -198,7 +197,7 @@ class _Reader:
             self.names = self._names(lines.line(int(numbers[0])))
             numbers = numbers[1:]
         if len(numbers) == 0:
-            raise InputError(f"{self.file}: no data rows; {self.hint}")
+            raise self._refused("no data rows")
         fields = self.profile.fields or len(self.names)
         return numbers, fields, self._places(fields)
 
@@ -217,13 +216,12 @@ class _Reader:
             found = [place for place, name in enumerate(self.names) if name == source]
             if len(found) != 1:
                 fault = "no column" if not found else "more than one column"
-                told = f"{fault} {quoted(source)}; the header holds {listed(self.names)}"
-                raise InputError(f"{self.file}: {told}; {self.hint}")
+                raise self._refused(f"{fault} {quoted(source)}; the header holds {listed(self.names)}")
             places[source] = found[0]
         for source, place in places.items():
             if place >= fields:
                 told = f"source {quoted(source)} is column {place} counted from 0"
-                raise InputError(f"{self.file}: {told}, and a row has {fields} fields; {self.hint}")
+                raise self._refused(f"{told}, and a row has {fields} fields")
         return places
 
     def _table(
@@ -238,7 +236,7 @@ class _Reader:
                 held = f"has {int(counts[np.argmax(short)])} ({counted(int(short.sum()), 'such row')})"
                 cure = "correct it, or leave such rows out by 'reject: {wrong_field_count: true}'"
                 told = f"{fields} fields were expected, line {line + 1} {held}"
-                raise InputError(f"{self.file}: {told}; {cure} in the profile; {self.hint}")
+                raise self._refused(f"{told}; {cure} in the profile")
             self._reject(f"without {fields} fields", short, lines, numbers)
         rows = np.flatnonzero(~short)
         content = lines.keep(numbers[rows])
