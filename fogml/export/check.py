@@ -105,11 +105,12 @@ def c_difference(
     lost samples and thermometers of their own make of windows.
     """
     fixed = source.numbers["fixed"]
-    gyro_step = float(fixed["gyro_value"]) if fixed and plan.gyro_unit == "count" else 0.0
-    past = _with_outputs(plan, history(plan, seed), gyro_step)
+    gyro_step = float(fixed["gyro_value"]) if fixed else 0.0
+    counts = gyro_step if plan.gyro_unit == "count" else 0.0
+    past = _with_outputs(plan, history(plan, seed), counts)
     off, flags, told, boxed = _over_history(plan, source, program, past)
     inside, outside = _largest(off[boxed != 1]), _largest(off[boxed == 1])
-    others = [_with_outputs(plan, recorded_history(plan, run, seed), gyro_step) for run in recorded]
+    others = [_with_outputs(plan, recorded_history(plan, run, seed), counts) for run in recorded]
     if source.layout.binned and all(atom.operator != "sign" for atom in plan.atoms):
         # Bins take samples for evenly rising, which a thermometer that shows steps does not. Of a soak's
         # direction steps leave nothing to compare.
@@ -140,18 +141,20 @@ def c_difference(
 
         return largest_in_box(plan, off, seed, beyond)
 
-    output = output_size(plan)
-    near, far, ppm = at(output), at(output, beyond=_BEYOND), None
+    # Rounding an output where it is taken adds to all else, whatever the drift; it is looked for of whole ones.
+    scale = abs(float(plan.arrays["scale"][0])) if plan.gives_rate else 1.0
+    output, taken = output_size(plan), 0.0 if counts else 0.5 * gyro_step * scale
+    near, far, ppm = at(output) + taken, at(output, beyond=_BEYOND) + taken, None
     if plan.gives_rate:
         turn = float(TURN_DEG_H / plan.arrays["scale"][0])
         ppm = 1e6 * at(turn, -turn) / (2.0 * TURN_DEG_H)
     return Difference(max(inside, near), max(outside, far), POINTS, len(off), good, differ, ppm)
 
 
-def _with_outputs(plan: Plan, past: History, gyro_step: float) -> History:
+def _with_outputs(plan: Plan, past: History, counts: float) -> History:
     """A history with outputs about its drift, as a gyro's are; whole counts of a model that takes them."""
     if plan.gives_rate:
-        return replace(past, gyro=np.round(past.gyro / gyro_step) * gyro_step) if gyro_step else past
+        return replace(past, gyro=np.round(past.gyro / counts) * counts) if counts else past
     left, _ = plan.compensated(past.atoms(plan), past.gyro)
     return replace(past, gyro=2.0 * past.gyro - left)
 
@@ -192,13 +195,17 @@ def _reading_steps(plan: Plan, source: CSource) -> FloatArray:
 def _atoms_off(
     plan: Plan, source: CSource, program: CProgram, atoms: FloatArray, read: FloatArray, gyro: float
 ) -> FloatArray:
-    """C of atoms as they are `read` less the plan of the `atoms` [deg/h], shape (n,)."""
+    """C of atoms as they are `read` less the plan of the `atoms` [deg/h], shape (n,), of whole outputs."""
     fixed = source.numbers["fixed"]
     output = np.full(len(atoms), gyro)
     everywhere = np.ones(len(atoms), dtype=np.bool_)
     expected, _ = plan.compensated(AtomValues(atoms, everywhere, everywhere), output)
     if not plan.gives_rate:
-        output, expected = 2.0 * output - expected, output
+        drift = output - expected
+        output = output + drift
+        if fixed is not None:
+            output = np.round(output / fixed["gyro_value"]) * fixed["gyro_value"]
+        expected = output - drift
     if fixed is None:
         out, _ = program.atoms(read, output)
         return np.asarray(out.astype(np.float64) - expected)

@@ -50,6 +50,18 @@ def test_whole_steps_of_readings_are_in_it(tmp_path):
     assert 0.9 * stated < found(plan, "q15", tmp_path, run, model) < 1.01 * stated
 
 
+def test_rounding_of_outputs_adds_to_that_of_readings(tmp_path):
+    """Half a step of 2^-8 degC on that slope, and half a step of 1/32 deg/h both taken and given."""
+    model = make_model("polynomial", features="T_in^1..3").fit(start(2.0))
+    plan = replace(Plan.of(model), output_bits=5)
+    source = c_source(plan, "q15", [])
+    stated = c_difference(plan, source, CProgram(source, tmp_path, flags=QUICK), 0).inside
+    T = np.linspace(15.1, 29.9, 200_000)
+    gyro = np.random.default_rng(5).uniform(-20.0, 20.0, len(T))
+    run = Run("slow", {"time": np.arange(float(len(T))), "gyro": gyro, "T_in": T})
+    assert 0.95 * stated < found(plan, "q15", tmp_path, run, model) < 1.01 * stated
+
+
 def test_windows_of_a_start_are_compared_where_its_slices_leave_no_history(tmp_path):
     model = make_model("polynomial", features="T_in, dT_in").fit(start(0.1))
     plan = Plan.of(model)
