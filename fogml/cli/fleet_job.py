@@ -79,8 +79,11 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     except OSError as error:
         raise full_disk(settings.out, error) from error
     _print(values, terminal)
+    if batch is not None:
+        _print_batch(batch, terminal)
     terminal.result(values)
-    terminal.say(f"Written to {settings.out}: open {home / 'fleet.html'}")
+    pages = [str(home / page) for page in ("fleet.html", "batch.html")[: 1 if batch is None else 2]]
+    terminal.say(f"Written to {settings.out}: open {' and '.join(pages)}")
     return all(unit["status"] == DONE and unit["met"] is not False for unit in values["units"])
 
 
@@ -197,3 +200,10 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     most = max(len(values[key]) for key in ("units", "outliers", "again"))
     if most > UNITS_SHOWN:
         terminal.say(f"The first {UNITS_SHOWN} of each are shown; fleet.html and fleet.xlsx hold all.")
+
+
+def _print_batch(batch: Mapping[str, Any], terminal: Terminal) -> None:
+    from fogml.report.acceptance_page import verdict_sentences
+
+    for sentence in (*verdict_sentences(batch), *batch["notes"]):
+        terminal.say(sentence)

@@ -140,6 +140,7 @@ class UnitWork:
             "model": ("shared" if self.shared else str(self.settings["model"])) if unit.train else "",
             "met": values["verdict"] in (ACCEPTED, NO_LIMITS),
             "verdict": values["verdict"],
+            "reasons": values["reasons"],
             "notes": values["notes"],
         }
 

@@ -187,7 +187,7 @@ class BatchSettings(Settings):
     """A batch of units from their acceptance reports: yield, distribution, links, who fails on what.
 
     With --out, writes batch.json, batch.html, batch.xlsx and lab-batch.config.yaml. Exit status 1 if a unit
-    is not accepted.
+    is not accepted or a folder holds no report.
     """
 
     job: ClassVar[str] = "fogml.cli.lab_jobs:batch_and_write"

@@ -243,11 +243,12 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
 def batch_and_write(settings: BatchSettings, terminal: Terminal) -> bool:
     """Gather reports, write the batch where a folder is named, print it; whether all are accepted."""
     from fogml.lab.acceptance import ACCEPTED
-    from fogml.lab.batch import batch_json, read_reports
+    from fogml.lab.batch import batch_json, read_reports, report_files
 
     def make() -> dict[str, Any]:
         home = None if settings.out is None else Path(settings.out)
-        return batch_json(read_reports(settings.reports), home)
+        files, lacking = report_files(settings.reports)
+        return batch_json(read_reports(files), home, lacking)
 
     def page(values: dict[str, Any]) -> str:
         from fogml.report.acceptance_page import batch_page
@@ -260,12 +261,12 @@ def batch_and_write(settings: BatchSettings, terminal: Terminal) -> bool:
         batch_spreadsheet(values, folder / "batch.xlsx")
 
     values = tell("lab batch", settings, terminal, make, page, _print_batch, sheets)
-    return values["counts"][ACCEPTED] == len(values["units"])
+    return values["counts"][ACCEPTED] == len(values["units"]) and not values["without_report"]
 
 
 def _print_batch(values: dict[str, Any], terminal: Terminal) -> None:
     from fogml.report.acceptance_page import distribution_table, verdict_sentences
 
     terminal.show(distribution_table(values))
-    for sentence in verdict_sentences(values):
+    for sentence in (*verdict_sentences(values), *values["notes"]):
         terminal.say(sentence)

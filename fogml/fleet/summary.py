@@ -79,6 +79,7 @@ def _unit(outcome: Mapping[str, Any]) -> dict[str, Any]:
         "outside_training": worst.get("outside_training"),
         "met": found.get("met"),
         "verdict": found.get("verdict", ""),
+        "reasons": list(found.get("reasons", ())),
         "effects": list(found.get("effects", ())),
         "notes": list(found.get("notes", ())),
     }
@@ -164,8 +165,7 @@ def _why_again(unit: Mapping[str, Any]) -> str:
     if unit["status"] != DONE:
         return f"its job failed: {unit['reason']}"
     if unit["met"] is False:
-        not_tested = unit["verdict"] == "incomplete"
-        return "not every limit is tested" if not_tested else "a stated limit is not met"
+        return "; ".join(unit["reasons"]) or "a stated limit is not met"
     if unit["after"] is None:
         return ""
     if doubts := [note for note in unit["notes"] if any(word in note for word in _OF_OUTPUTS)]:

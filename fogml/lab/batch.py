@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from os.path import relpath
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, listed
 from fogml.intervals import LEVEL
 from fogml.json_files import finite_json, json_object, read_json
 from fogml.lab.acceptance import ACCEPTED, INCOMPLETE, NO_LIMITS, REJECTED
@@ -29,7 +29,7 @@ _ORDER = {REJECTED: 0, INCOMPLETE: 1, NO_LIMITS: 2, ACCEPTED: 3}
 
 
 def read_reports(paths: Sequence[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
-    """Acceptance reports by their files; a folder stands for the report in it.
+    """Acceptance reports by their files; a folder stands for those that `report_files` finds in it.
 
     Raises
     ------
@@ -38,8 +38,7 @@ def read_reports(paths: Sequence[str | Path]) -> list[tuple[Path, dict[str, Any]
     """
     found: list[tuple[Path, dict[str, Any]]] = []
     of: dict[tuple[Any, Any], Path] = {}
-    for path in map(Path, paths):
-        file = path / REPORT if path.is_dir() else path
+    for file in report_files(paths)[0]:
         values = read_json(file, "name acceptance reports (acceptance.json) or their folders")
         held = json_object(values, str(file), ACCEPTANCE, "'fogml lab acceptance' writes one")
         _check_whole(held, file)
@@ -52,13 +51,46 @@ def read_reports(paths: Sequence[str | Path]) -> list[tuple[Path, dict[str, Any]
     return found
 
 
+def report_files(paths: Sequence[str | Path]) -> tuple[list[Path], list[str]]:
+    """Files of reports, and names of folders without one.
+
+    A folder stands for the report in it, or for those in its own folders, as of three axes or a fleet.
+
+    Raises
+    ------
+    InputError
+        If no folder holds a report and no file is named.
+    """
+    files: list[Path] = []
+    lacking: list[str] = []
+    for path in map(Path, paths):
+        inner = [path / REPORT] if (path / REPORT).is_file() else sorted(path.glob(f"*/{REPORT}"))
+        files += inner if path.is_dir() else [path]
+        if path.is_dir() and not inner:
+            lacking.append(path.resolve().name)
+    if not files:
+        raise InputError(f"{paths[0]}: holds no {REPORT}; name acceptance reports or their folders")
+    return files, lacking
+
+
 def _check_whole(report: Mapping[str, Any], file: Path) -> None:
     """Hold that a report has what a batch reads of it."""
     rows, verdict = report.get("rows"), report.get("verdict")
     told = [isinstance(report.get(key, 0), str | None) for key in ("serial_number", "axis", "date")]
     whole = all(told) and isinstance(report.get("reasons"), list) and isinstance(verdict, str)
+    whole = whole and _tells_how(report)
     if not (whole and verdict in _ORDER and isinstance(rows, list) and all(map(_is_row, rows))):
         raise InputError(f"{file}: parts of an acceptance report lack; 'fogml lab acceptance' writes it anew")
+
+
+def _tells_how(report: Mapping[str, Any]) -> bool:
+    """Whether a report tells its averages, limits, and hashes of its runs."""
+    runs, limits = report.get("runs"), report.get("limits", "")
+    hashed = isinstance(runs, list) and all(
+        isinstance(run, dict) and {"run", "sha256"} <= set(run) for run in runs
+    )
+    limited = limits is None or (isinstance(limits, dict) and {"file", "sha256", "document"} <= set(limits))
+    return hashed and limited and isinstance(report.get("averaging_s"), int | float)
 
 
 def _is_row(row: Any) -> bool:
@@ -86,7 +118,8 @@ def batch_json(
         Schema ``fogml.batch/1``: ``counts`` of verdicts, ``yield`` with its 90 % interval, ``quantities``
         with distribution of sizes, limit, how many are over it and of how many the figure is an upper or
         lower bound alone (``at_most``, ``at_least``), ``units`` with those rejected first,
-        ``without_report`` units that have none.
+        ``without_report`` units that have none, ``notes`` on runs that stand in several reports and on what
+        reports are not alike in, ``synthetic`` where any run is.
     """
     units = [_unit(file, report, home) for file, report in reports]
     units.sort(key=_place)
@@ -104,8 +137,67 @@ def batch_json(
         "quantities": _quantities([report for _, report in reports]),
         "units": units,
         "without_report": list(lacking),
+        "notes": [*_runs_twice(reports), *_not_alike(reports)],
+        "synthetic": any(bool(report.get("synthetic")) for _, report in reports),
     }
     return finite_json(values)
+
+
+def _label(report: Mapping[str, Any]) -> str:
+    return " ".join(str(part) for part in (report["serial_number"], report["axis"]) if part) or "not stated"
+
+
+def _runs_twice(reports: Sequence[tuple[Path, Mapping[str, Any]]]) -> list[str]:
+    """Runs that stand in reports of several gyros, which no recording of one does."""
+    of: dict[str, dict[str, str]] = defaultdict(dict)
+    for _, report in reports:
+        for run in report["runs"]:
+            of[run["sha256"]][_label(report)] = str(run["run"])
+    shared: dict[tuple[str, ...], set[str]] = defaultdict(set)
+    for names in of.values():
+        if len(names) > 1:
+            shared[tuple(names)] |= set(names.values())
+    return [
+        f"{listed(gyros, 8)}: the same recordings stand in the report of each ({listed(sorted(runs), 3)}): "
+        "one of them at most was tested on its own"
+        for gyros, runs in shared.items()
+    ]
+
+
+def _not_alike(reports: Sequence[tuple[Path, Mapping[str, Any]]]) -> list[str]:
+    """What keeps figures of several reports from being compared: ways in which they were made."""
+    notes = []
+    for what, way in _WAYS.items():
+        by_way: dict[str, list[str]] = defaultdict(list)
+        for _, report in reports:
+            by_way[way(report)].append(_label(report))
+        (most, _), *others = sorted(by_way.items(), key=lambda one: -len(one[1])) or [("", [])]
+        if others:
+            told = "; ".join(f"{name} for {listed(gyros, 8)}" for name, gyros in others)
+            notes.append(
+                f"{what} not the same for all units: {most}, but {told}; their figures stand side by side"
+            )
+    return notes
+
+
+def _limits_named(report: Mapping[str, Any]) -> str:
+    limits = report["limits"]
+    return (
+        "none" if limits is None else f"{limits['document'] or limits['file']} ({str(limits['sha256'])[:8]})"
+    )
+
+
+def _earth(report: Mapping[str, Any]) -> str:
+    known = any(run.get("bias_reference") == "earth rate" for run in report["runs"])
+    return "taken off the bias" if known else "left in the bias"
+
+
+_WAYS: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "Averages are": lambda report: f"{report['averaging_s']:g} s",
+    "Compensation is": lambda report: "none" if report.get("model") is None else "by a model",
+    "Limits are": _limits_named,
+    "Earth rate is": _earth,
+}
 
 
 def _interval(part: int, whole: int) -> tuple[float, float]:
@@ -151,7 +243,7 @@ def _quantities(reports: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         held = [figure for row in rows if (figure := figure_of(row)) is not None]
         if not held:
             continue
-        limits = [row["limit"] for row in rows if row["limit"] is not None]
+        limits = [row["limit"] for row in rows]
         quantiles = np.quantile(np.abs(held), list(_SHARES.values()))
         told.append(
             {
@@ -160,7 +252,7 @@ def _quantities(reports: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "unit": quantity.unit,
                 "tested": len(held),
                 "distribution": dict(zip(_SHARES, map(float, quantiles), strict=True)),
-                "limit": limits[0] if limits and all(limit == limits[0] for limit in limits) else None,
+                "limit": limits[0] if all(limit == limits[0] for limit in limits) else None,
                 "limits_differ": any(limit != limits[0] for limit in limits),
                 "over": sum(row["met"] is False for row in rows),
                 **{bound: sum(bool(row.get(bound)) for row in rows) for bound in BOUNDS},

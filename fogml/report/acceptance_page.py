@@ -204,6 +204,7 @@ def batch_page(values: Mapping[str, Any], name: str = "Batch") -> str:
         title=f"{name} – acceptance of a batch",
         name=name,
         verdict=verdict_sentences(values),
+        values=values,
         tiles=_tiles(values),
         distribution=distribution_table(values),
         left_out=len(values["quantities"]) - len(shown),
@@ -229,14 +230,15 @@ def verdict_sentences(values: Mapping[str, Any]) -> list[str]:
             f"{percent(found['share'])} (90 % interval: {percent(low)} to {percent(high)})."
         )
     sentences = [first]
-    if counts["incomplete"]:
-        sentences.append(f"{plural(counts['incomplete'], 'unit')} incomplete: not in the yield.")
+    for verdict, words in (("incomplete", "incomplete"), ("no_limits", "without limits")):
+        if counts[verdict]:
+            sentences.append(f"{plural(counts[verdict], 'unit')} {words}: not in the yield.")
     if lacking := values.get("without_report"):
         sentences.append(f"Without a report, and not in the yield: {listed(lacking, 8)}.")
-    over = [one for one in values["quantities"] if one["over"]]
+    over = sorted((one for one in values["quantities"] if one["over"]), key=lambda one: -int(one["over"]))
     if over:
-        worst = max(over, key=lambda one: int(one["over"]))
-        sentences.append(f"Most are rejected for {worst['name'][:1].lower()}{worst['name'][1:]}.")
+        told = [f"{one['name'][:1].lower()}{one['name'][1:]} ({one['over']})" for one in over]
+        sentences.append(f"Units that miss a limit: {'; '.join(told)}.")
     return sentences
 
 

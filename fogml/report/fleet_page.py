@@ -185,7 +185,7 @@ def units_table(order: list[Mapping[str, Any]]) -> Table:
 def _status(unit: Mapping[str, Any]) -> str:
     """How a unit's job ended, in words."""
     if unit["verdict"] == "incomplete":
-        return "limits not all tested"
+        return "incomplete"
     return str(unit["status"]) if unit["met"] is not False else "limit not met"
 
 

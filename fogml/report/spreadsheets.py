@@ -78,7 +78,10 @@ def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
         same = ("unit", "tested", *shares, "limit_from", "limit_to", "over", *BOUNDS)
         told = [{**one, **one["distribution"], **_ends(one)} for one in values["quantities"]]
         names = {"name": "quantity", **{key: key.replace("_", " ") for key in same}}
+        names |= {key: f"{key} of sizes" for key in shares}
         writer.table_sheet("Distribution", names, told, (18,))
+        if values["notes"]:
+            writer.table_sheet("Noticed", ("what",), [(note,) for note in values["notes"]], (120,))
 
 
 def _ends(quantity: Mapping[str, Any]) -> dict[str, float | str | None]:

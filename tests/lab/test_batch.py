@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from fogml.cli.main import app
 from fogml.errors import InputError
 from fogml.lab.acceptance_rows import QUANTITIES
-from fogml.lab.batch import batch_json, read_reports
+from fogml.lab.batch import batch_json, read_reports, report_files
 from fogml.numerals import in_order_of_serial
 from fogml.report.acceptance_page import batch_page, distribution_table, verdict_sentences
 from fogml.report.spreadsheets import batch_spreadsheet
@@ -57,7 +57,7 @@ def report(place: int, bias: float | None, runs: int = 1) -> dict:
         }
         for t in (-40, 25, 70)
     ]
-    run = {"sha256": "9f" * 32, "started": "2026-03-02T08:00:00+00:00", "span_h": 14.0}
+    run = {"started": "2026-03-02T08:00:00+00:00", "span_h": 14.0}
     more = {"temperature_degC": [-40.0, 70.0], "outside_training": 0.0}
     return {
         "schema": "fogml.acceptance/1",
@@ -66,7 +66,10 @@ def report(place: int, bias: float | None, runs: int = 1) -> dict:
         "date": None,
         "synthetic": True,
         "averaging_s": 100.0,
-        "runs": [{"run": f"{SERIAL.format(place)}-run-{i}.csv", **run, **more} for i in range(runs)],
+        "runs": [
+            {"run": f"{SERIAL.format(place)}-run-{i}.csv", "sha256": f"{place:032x}{i:032x}", **run, **more}
+            for i in range(runs)
+        ],
         "model": None,
         "limits": {"file": "limits.yaml", "sha256": "ab" * 32, "customer": "ACME", "document": None},
         "soaks": soaks,
@@ -137,6 +140,63 @@ def test_units_without_a_report_are_told_and_not_in_the_yield():
     assert not any("Without a report" in told for told in verdict_sentences(batch_json(reports)))
 
 
+def test_recordings_that_stand_under_two_serial_numbers_are_told():
+    """A copied file makes a unit that was never tested pass; a gyro has recordings of its own."""
+    reports = [(Path(f"{place}.json"), report(place, 0.01, runs=2)) for place in (1, 2, 3)]
+    assert batch_json(reports)["notes"] == []
+    reports[2][1]["runs"][1]["sha256"] = reports[0][1]["runs"][0]["sha256"]
+    values = batch_json(reports)
+    (told,) = values["notes"]
+    first, third = (f"{SERIAL.format(place)} z" for place in (1, 3))
+    assert told.startswith(f"{first}, {third}: the same recordings") and SERIAL.format(2) not in told
+    assert told in batch_page(values) and "synthetic data" in batch_page(values)
+
+
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [
+        ({"averaging_s": 10.0}, "Averages are not the same for all units: 100 s, but 10 s for {}"),
+        (
+            {"model": {"kind": "mean"}},
+            "Compensation is not the same for all units: none, but by a model for {}",
+        ),
+        ({"limits": None}, "Limits are not the same for all units: limits.yaml (abababab), but none for {}"),
+    ],
+)
+def test_units_whose_reports_were_made_another_way_are_told(other, told):
+    """Their figures, as of bias stability over 10 s and over 100 s, are no one distribution."""
+    reports = [(Path(f"{place}.json"), report(place, 0.01)) for place in (1, 2, 3)]
+    reports[1][1].update(other)
+    (note,) = batch_json(reports)["notes"]
+    assert note.startswith(told.format(f"{SERIAL.format(2)} z"))
+
+
+def test_a_limit_that_only_some_units_have_is_not_the_batch_s():
+    reports = [(Path(f"{place}.json"), report(place, 0.07)) for place in (1, 2)]
+    for row in reports[1][1]["rows"]:
+        row |= {"limit": None, "met": None}
+    reports[1][1]["verdict"] = "no_limits"
+    values = batch_json(reports)
+    (bias,) = values["quantities"]
+    assert (bias["limit"], bias["limits_differ"], bias["over"]) == (None, True, 1)
+    assert "1 unit without limits: not in the yield." in verdict_sentences(values)
+    assert "Units that miss a limit: bias (1)." in verdict_sentences(values)
+
+
+def test_a_folder_stands_for_the_reports_in_its_own_folders(folders, tmp_path):
+    (tmp_path / "triad" / "x").mkdir(parents=True)
+    (tmp_path / "empty").mkdir()
+    (folders[0] / "acceptance.json").rename(tmp_path / "triad" / "x" / "acceptance.json")
+    files, lacking = report_files([tmp_path / "triad", folders[1], tmp_path / "empty"])
+    assert files == [tmp_path / "triad" / "x" / "acceptance.json", folders[1] / "acceptance.json"]
+    assert lacking == ["empty"]
+    words = ["lab", "batch", files[0], tmp_path / "empty"]
+    result = CliRunner().invoke(app, list(map(str, words)))
+    assert result.exit_code == 1 and "Without a report, and not in the yield: empty." in result.stdout
+    with pytest.raises(InputError, match=r"holds no acceptance\.json"):
+        report_files([tmp_path / "empty"])
+
+
 def test_a_unit_twice_and_a_file_of_another_kind_are_refused(folders, tmp_path):
     (tmp_path / "more").mkdir()
     (tmp_path / "more" / "acceptance.json").write_text(json.dumps(report(1, 0.0)))
@@ -160,7 +220,8 @@ def test_command(folders, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "damage", [{"serial_number": ["FOG"]}, {"rows": [{}]}, {"verdict": "good"}, {"reasons": None}]
+    "damage",
+    [{"serial_number": ["FOG"]}, {"rows": [{}]}, {"verdict": "good"}, {"reasons": None}, {"runs": [{}]}],
 )
 def test_a_damaged_report_is_named(tmp_path, damage):
     path = tmp_path / "acceptance.json"
