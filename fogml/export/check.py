@@ -141,7 +141,7 @@ def c_difference(
 
         return largest_in_box(plan, off, seed, beyond)
 
-    # Rounding an output where it is taken adds to all else, whatever the drift; it is looked for of whole ones.
+    # Rounding an output where it is taken adds to all else, whatever the drift: looked for of whole ones.
     scale = abs(float(plan.arrays["scale"][0])) if plan.gives_rate else 1.0
     output, taken = output_size(plan), 0.0 if counts else 0.5 * gyro_step * scale
     near, far, ppm = at(output) + taken, at(output, beyond=_BEYOND) + taken, None
